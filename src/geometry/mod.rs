@@ -1,0 +1,8 @@
+//! Surfaces: ids, connectivity, positions, and formulas on single triangles.
+pub mod connectivity;
+pub mod ids;
+pub mod mesh;
+pub mod triangle;
+
+#[cfg(test)]
+pub(crate) mod polycube;
