@@ -1,0 +1,152 @@
+//! The soup under construction: limits, finite positions, corner attributes that not every face has.
+
+use super::ReadParams;
+use super::error::{Place, ReadProblem};
+use crate::geometry::ids::NONE;
+use crate::geometry::mesh::{AttributeKind, CornerAttribute, Part, Soup};
+
+/// Notes beyond this number say nothing new.
+const MAX_NOTES: usize = 64;
+
+/// Collects vertices, triangles and attributes; refuses what exceeds the limits.
+pub(super) struct SoupBuilder {
+    pub soup: Soup,
+    notes: Vec<String>,
+    max_vertices: u64,
+    max_faces: u64,
+}
+
+impl SoupBuilder {
+    pub fn new(params: &ReadParams) -> Self {
+        // 2³² − 1 means "none" in every array of ids.
+        let ids = u64::from(NONE) - 1;
+        Self {
+            soup: Soup::default(),
+            notes: Vec::new(),
+            max_vertices: params.max_vertices.min(ids),
+            max_faces: params.max_faces.min(ids),
+        }
+    }
+
+    /// Refuses a number of further vertices before anything is set aside for them.
+    pub fn expect_vertices(&self, more: u64) -> Result<(), ReadProblem> {
+        let count = (self.soup.positions.len() as u64).saturating_add(more);
+        let limit = self.max_vertices;
+        match count > limit {
+            true => Err(ReadProblem::TooManyVertices { count, limit }),
+            false => Ok(()),
+        }
+    }
+
+    /// Refuses a number of further triangles before anything is set aside for them.
+    pub fn expect_faces(&self, more: u64) -> Result<(), ReadProblem> {
+        let count = (self.soup.faces.len() as u64).saturating_add(more);
+        let limit = self.max_faces;
+        match count > limit {
+            true => Err(ReadProblem::TooManyFaces { count, limit }),
+            false => Ok(()),
+        }
+    }
+
+    /// How many vertices and triangles may still come.
+    pub fn room(&self) -> (u64, u64) {
+        let (vertices, faces) = (self.soup.positions.len(), self.soup.faces.len());
+        let vertices = self.max_vertices.saturating_sub(vertices as u64);
+        (vertices, self.max_faces.saturating_sub(faces as u64))
+    }
+
+    /// Appends a vertex.
+    pub fn vertex(&mut self, position: [f64; 3], place: Place) -> Result<(), ReadProblem> {
+        self.expect_vertices(1)?;
+        if let Some(k) = position.iter().position(|x| !x.is_finite()) {
+            return Err(ReadProblem::NotFinite {
+                vertex: self.soup.positions.len(),
+                place,
+                axis: ['x', 'y', 'z'][k],
+                value: position[k],
+            });
+        }
+        self.soup.positions.push(position);
+        Ok(())
+    }
+
+    /// Appends a triangle whose indices the caller has checked or will check.
+    pub fn face(&mut self, corners: [u32; 3], material: u32) -> Result<(), ReadProblem> {
+        self.expect_faces(1)?;
+        self.soup.faces.push(corners);
+        self.soup.face_material.push(material);
+        Ok(())
+    }
+
+    /// Remembers something that the soup does not hold.
+    pub fn note(&mut self, note: impl Into<String>) {
+        let note = note.into();
+        if self.notes.len() > MAX_NOTES || self.notes.contains(&note) {
+            return;
+        }
+        self.notes.push(match self.notes.len() {
+            MAX_NOTES => "there is more to note than is listed here".into(),
+            _ => note,
+        });
+    }
+
+    /// Begins a part here; it ends where the next begins.
+    pub fn part(&mut self, name: String) {
+        self.close_part();
+        self.soup.parts.push(Part {
+            name,
+            first_vertex: self.soup.positions.len(),
+            vertices: 0,
+            first_face: self.soup.faces.len(),
+            faces: 0,
+        });
+    }
+
+    fn close_part(&mut self) {
+        let (vertices, faces) = (self.soup.positions.len(), self.soup.faces.len());
+        if let Some(part) = self.soup.parts.last_mut() {
+            part.vertices = vertices - part.first_vertex;
+            part.faces = faces - part.first_face;
+            if part.vertices == 0 && part.faces == 0 {
+                self.soup.parts.pop();
+            }
+        }
+    }
+
+    /// Adds an attribute whose values follow the corners of the first faces; the others get NaN.
+    pub fn attribute_values(&mut self, kind: AttributeKind, components: usize, values: Vec<f32>) {
+        self.soup.attributes.push(CornerAttribute {
+            kind,
+            components,
+            values,
+        });
+    }
+
+    /// Spreads a value a vertex over the corners of all faces so far.
+    pub fn vertex_attribute(&mut self, kind: AttributeKind, components: usize, values: &[f32]) {
+        let corners = self.soup.faces.iter().flatten();
+        let row = |&v: &u32| &values[v as usize * components..(v as usize + 1) * components];
+        let values = corners.flat_map(row).copied().collect();
+        self.attribute_values(kind, components, values);
+    }
+
+    /// The finished soup and its notes.
+    pub fn finish(mut self) -> Result<(Soup, Vec<String>), ReadProblem> {
+        if self.soup.faces.is_empty() {
+            let vertices = self.soup.positions.len();
+            return Err(ReadProblem::EmptyMesh { vertices });
+        }
+        self.close_part();
+        let corners = 3 * self.soup.faces.len();
+        for attribute in &mut self.soup.attributes {
+            attribute
+                .values
+                .resize(corners * attribute.components, f32::NAN);
+            // NaN says "no value"; infinity would spread through every interpolation.
+            for value in attribute.values.iter_mut().filter(|v| v.is_infinite()) {
+                *value = f32::NAN;
+            }
+        }
+        Ok((self.soup, self.notes))
+    }
+}
