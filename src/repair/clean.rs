@@ -1,0 +1,295 @@
+//! Faces that stay: no repeated vertex, no duplicate, no face without area.
+//!
+//! A face whose three corners lie on one line cannot just be dropped: the faces at its two short sides
+//! and the face at its long side would no longer meet.
+//!
+//! ```text
+//!          d                    d
+//!        /   \                / | \          face abc has no area, b lies on side ac:
+//!       /     \       →      /  |  \         it goes, and every other face at side ac
+//!      a - b - c            a - b - c        is split at b. The surface stays where it is.
+//! ```
+
+use crate::geometry::mesh::{Soup, distance};
+use crate::repair::log::{Change, RemovalReason};
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeSet, HashMap};
+
+/// A triangle is *collinear* where its two short sides together are not longer than its long side by more
+/// than this fraction: within the rounding of the three lengths, so that no metric that keeps them
+/// has a triangle inequality left. The thinnest face of the models tried has 3e-6.
+const COLLINEAR_EXCESS: f64 = 8.0 * f64::EPSILON;
+
+/// A face on its way to the surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DraftFace {
+    /// Welded vertices, in the order of the file.
+    pub vertices: [u32; 3],
+    /// Face of the input that it is or lies in.
+    pub source: u32,
+    /// Where it is a part only: barycentric coordinates of its corners in the source face.
+    pub within: Option<Box<[[f64; 3]; 3]>>,
+}
+
+/// The faces that stay, in the order of the file; parts of split faces at the end.
+pub fn clean(soup: &Soup, stands_for: &[u32], changes: &mut Vec<Change>) -> Vec<DraftFace> {
+    let mut faces = Vec::with_capacity(soup.faces.len());
+    for (f, corners) in soup.faces.iter().enumerate() {
+        let vertices = corners.map(|v| stands_for[v as usize]);
+        let [a, b, c] = vertices;
+        if a == b || b == c || c == a {
+            changes.push(Change::RemovedFace {
+                face: f as u32,
+                reason: RemovalReason::RepeatedVertex,
+            });
+        } else {
+            faces.push(DraftFace {
+                vertices,
+                source: f as u32,
+                within: None,
+            });
+        }
+    }
+    drop_duplicates(&mut faces, changes);
+    if faces.iter().any(|f| middle_corner(f, soup).is_some()) {
+        take_out_collinear(&mut faces, soup, changes);
+        faces.sort_by_key(|f| f.source);
+        drop_duplicates(&mut faces, changes);
+    }
+    faces
+}
+
+/// Of faces with the same three vertices the first stays, whatever the orientation of the others, unless they are a
+/// sheet that hangs on something: see [`drop_flaps`].
+fn drop_duplicates(faces: &mut Vec<DraftFace>, changes: &mut Vec<Change>) {
+    // Source face of the first, its orientation, and whether it comes the other way too.
+    let mut seen: HashMap<[u32; 3], (u32, bool, bool)> = HashMap::with_capacity(faces.len());
+    let mut any_two_sided = false;
+    faces.retain(|face| {
+        let (key, even) = sorted(face.vertices);
+        match seen.entry(key) {
+            Entry::Vacant(entry) => {
+                entry.insert((face.source, even, false));
+                true
+            }
+            Entry::Occupied(mut entry) => {
+                let (first, orientation, two_sided) = entry.get_mut();
+                *two_sided |= *orientation != even;
+                any_two_sided |= *two_sided;
+                changes.push(Change::RemovedFace {
+                    face: face.source,
+                    reason: RemovalReason::DuplicateOf(*first),
+                });
+                false
+            }
+        }
+    });
+    if any_two_sided {
+        let two_sided = faces
+            .iter()
+            .map(|f| seen[&sorted(f.vertices).0].2)
+            .collect();
+        drop_flaps(faces, two_sided, changes);
+    }
+}
+
+/// Ascending vertices, and whether that is an even permutation.
+fn sorted([a, b, c]: [u32; 3]) -> ([u32; 3], bool) {
+    let mut key = [a, b, c];
+    key.sort_unstable();
+    let rotated = key == [a, b, c] || key == [b, c, a] || key == [c, a, b];
+    (key, rotated)
+}
+
+/// A face given from both sides is a sheet without volume. Where such sheets hang on nothing else, one side is the
+/// surface. Where they hang on an edge that has two or more other faces (a flap, or the walls between cells), both sides
+/// go: every edge loses two faces at a time, so what was closed stays closed.
+fn drop_flaps(faces: &mut Vec<DraftFace>, two_sided: Vec<bool>, changes: &mut Vec<Change>) {
+    let mut sides: Vec<(u32, u32, usize)> = faces
+        .iter()
+        .enumerate()
+        .flat_map(|(i, f)| {
+            let v = f.vertices;
+            [(v[0], v[1]), (v[1], v[2]), (v[2], v[0])].map(|(a, b)| (a.min(b), a.max(b), i))
+        })
+        .collect();
+    sides.sort_unstable();
+    let mut hangs = vec![false; faces.len()];
+    let mut belongs = vec![false; faces.len()];
+    let mut neighbours: Vec<Vec<usize>> = vec![Vec::new(); faces.len()];
+    for edge in sides.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+        let (flat, solid): (Vec<usize>, Vec<usize>) =
+            edge.iter().map(|side| side.2).partition(|&i| two_sided[i]);
+        for pair in flat.windows(2) {
+            neighbours[pair[0]].push(pair[1]);
+            neighbours[pair[1]].push(pair[0]);
+        }
+        for i in flat {
+            hangs[i] |= solid.len() >= 2;
+            belongs[i] |= solid.len() == 1;
+        }
+    }
+    let mut goes = vec![false; faces.len()];
+    let mut seen = vec![false; faces.len()];
+    for seed in (0..faces.len()).filter(|&i| two_sided[i]) {
+        if seen[seed] {
+            continue;
+        }
+        let mut sheet = vec![seed];
+        seen[seed] = true;
+        let mut next = 0;
+        while next < sheet.len() {
+            for &j in &neighbours[sheet[next]] {
+                if !seen[j] {
+                    seen[j] = true;
+                    sheet.push(j);
+                }
+            }
+            next += 1;
+        }
+        if sheet.iter().any(|&i| hangs[i]) && !sheet.iter().any(|&i| belongs[i]) {
+            sheet.iter().for_each(|&i| goes[i] = true);
+        }
+    }
+    let mut i = 0;
+    faces.retain(|face| {
+        let stays = !goes[i];
+        i += 1;
+        if !stays {
+            changes.push(Change::RemovedFace {
+                face: face.source,
+                reason: RemovalReason::Flap,
+            });
+        }
+        stays
+    });
+}
+
+/// The corner that lies on the opposite side, where the face is collinear.
+fn middle_corner(face: &DraftFace, soup: &Soup) -> Option<usize> {
+    let p = face.vertices.map(|v| soup.positions[v as usize]);
+    let opposite: [f64; 3] = std::array::from_fn(|k| distance(p[(k + 1) % 3], p[(k + 2) % 3]));
+    let longest = (0..3).fold(0, |k, j| if opposite[j] > opposite[k] { j } else { k });
+    let short = opposite[(longest + 1) % 3] + opposite[(longest + 2) % 3];
+    (short - opposite[longest] <= COLLINEAR_EXCESS * opposite[longest]).then_some(longest)
+}
+
+fn edge(a: u32, b: u32) -> (u32, u32) {
+    (a.min(b), a.max(b))
+}
+
+/// Takes out collinear faces as the module docs show, lowest first. A face that is split may become
+/// collinear itself and wait in turn; the number of rounds is bounded, and what is left then stays.
+fn take_out_collinear(faces: &mut Vec<DraftFace>, soup: &Soup, changes: &mut Vec<Change>) {
+    let mut slots: Vec<Option<DraftFace>> = faces.drain(..).map(Some).collect();
+    let mut at_edge: HashMap<(u32, u32), BTreeSet<usize>> = HashMap::new();
+    let mut waiting = BTreeSet::new();
+    for (i, face) in slots.iter().enumerate() {
+        let Some(face) = face else { continue };
+        enlist(&mut at_edge, i, face);
+        if middle_corner(face, soup).is_some() {
+            waiting.insert(i);
+        }
+    }
+    let mut rounds_left = 64 + 16 * waiting.len();
+    while let Some(i) = waiting.pop_first() {
+        let Some(face) = slots[i].clone() else {
+            continue;
+        };
+        let Some(k) = middle_corner(&face, soup).filter(|_| rounds_left > 0) else {
+            continue;
+        };
+        rounds_left -= 1;
+        let (b, c, a) = (
+            face.vertices[k],
+            face.vertices[(k + 1) % 3],
+            face.vertices[(k + 2) % 3],
+        );
+        remove(&mut slots, &mut at_edge, i, &face, changes);
+        let others = at_edge.get(&edge(a, c)).cloned().unwrap_or_default();
+        for j in others {
+            let Some(other) = slots[j].clone() else {
+                continue;
+            };
+            if other.vertices.contains(&b) {
+                // The same line seen from its other side: both vanish, and all three edges lose two faces.
+                remove(&mut slots, &mut at_edge, j, &other, changes);
+                continue;
+            }
+            delist(&mut at_edge, j, &other);
+            changes.push(Change::SplitFace {
+                face: other.source,
+                at: b,
+            });
+            let [first, second] = halves(&other, [a, c], b, soup);
+            for (slot, half) in [(j, first), (slots.len(), second)] {
+                enlist(&mut at_edge, slot, &half);
+                if middle_corner(&half, soup).is_some() {
+                    waiting.insert(slot);
+                }
+                if slot == slots.len() {
+                    slots.push(Some(half));
+                } else {
+                    slots[slot] = Some(half);
+                }
+            }
+        }
+    }
+    faces.extend(slots.into_iter().flatten());
+}
+
+fn enlist(at_edge: &mut HashMap<(u32, u32), BTreeSet<usize>>, i: usize, face: &DraftFace) {
+    for k in 0..3 {
+        let e = edge(face.vertices[k], face.vertices[(k + 1) % 3]);
+        at_edge.entry(e).or_default().insert(i);
+    }
+}
+
+fn delist(at_edge: &mut HashMap<(u32, u32), BTreeSet<usize>>, i: usize, face: &DraftFace) {
+    for k in 0..3 {
+        let e = edge(face.vertices[k], face.vertices[(k + 1) % 3]);
+        if let Some(list) = at_edge.get_mut(&e) {
+            list.remove(&i);
+        }
+    }
+}
+
+fn remove(
+    slots: &mut [Option<DraftFace>],
+    at_edge: &mut HashMap<(u32, u32), BTreeSet<usize>>,
+    i: usize,
+    face: &DraftFace,
+    changes: &mut Vec<Change>,
+) {
+    delist(at_edge, i, face);
+    slots[i] = None;
+    changes.push(Change::RemovedFace {
+        face: face.source,
+        reason: RemovalReason::Collinear,
+    });
+}
+
+/// The two parts of a face whose side between `ends` is split at vertex `b`; the part at `ends[0]` first.
+fn halves(face: &DraftFace, ends: [u32; 2], b: u32, soup: &Soup) -> [DraftFace; 2] {
+    let p = |v: u32| soup.positions[v as usize];
+    let corner = |v: u32| face.vertices.iter().position(|&w| w == v).unwrap_or(0);
+    let [at_a, at_c] = ends.map(corner);
+    let (near, far) = (distance(p(ends[0]), p(b)), distance(p(b), p(ends[1])));
+    let t = if near + far > 0.0 {
+        near / (near + far)
+    } else {
+        0.5
+    };
+    let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let within = face.within.as_deref().copied().unwrap_or(identity);
+    let middle: [f64; 3] =
+        std::array::from_fn(|i| (1.0 - t) * within[at_a][i] + t * within[at_c][i]);
+    [at_c, at_a].map(|replaced| {
+        let mut part = face.clone();
+        let mut weights = within;
+        part.vertices[replaced] = b;
+        weights[replaced] = middle;
+        part.within = Some(Box::new(weights));
+        part
+    })
+}

@@ -1,0 +1,282 @@
+//! From the triangles of a file to oriented manifold components, with a log of every change.
+//!
+//! *Enters:* a [`Soup`]: nothing welded, nothing oriented, nothing removed.
+//! *Leaves:* connected [`Component`]s, each a [`Mesh`] without doubled edges, or the reason why it
+//! is none; where every vertex of the file went; every change by name and place.
+//!
+//! The steps, each in its own file:
+//!
+//! 1. **weld** ([`weld`]): vertices at one position become one, but only where that can close
+//!    something: both lie on an open edge, or an edge joins them (it has length zero). Two closed
+//!    sheets that merely touch stay apart.
+//! 2. **clean** ([`clean`]): faces with a repeated vertex and duplicates go; faces without area whose
+//!    corners lie on one line are taken out so that no T-junction stays.
+//! 3. **glue** ([`glue`]): which sides of faces are joined. Two faces at an edge always are; where more
+//!    meet, those that enclose a solid wedge are joined and the rest stays open. Orientation flows
+//!    across edges with exactly two faces, and the minority is flipped.
+//! 4. **assemble** ([`assemble`]): one vertex a fan, one mesh a component, doubled edges split.
+//!
+//! *Guaranteed:* surviving vertices and faces keep the order of the file (copies and new vertices
+//! come last); the surface stays where it is when nothing is welded with a tolerance; same input, same output.
+//! *Not guaranteed:* that a closed component encloses a positive volume (the majority of the input's
+//! faces decides which side is out, not the volume), nor freedom from self-intersections.
+
+pub mod assemble;
+pub mod clean;
+pub mod glue;
+pub mod log;
+pub mod weld;
+
+use crate::geometry::connectivity::ConnectivityError;
+use crate::geometry::ids::{NONE, VertexId};
+use crate::geometry::mesh::{Mesh, Soup};
+pub use log::{Change, RemovalReason, RepairLog};
+
+/// What repair may do.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RepairParams {
+    /// Join vertices at the same position where that closes open edges.
+    pub weld: bool,
+    /// Largest distance of vertices that are welded, as a fraction of the bounding box's diagonal:
+    /// 0 (exactly equal positions) or 1e-12 to 0.1.
+    pub weld_tolerance: f64,
+    /// Refuse where anything but unused vertices would change, instead of changing it.
+    pub strict: bool,
+    /// Most components (each becomes an atlas of its own), at least 1. More are a sign of input that no repair helps:
+    /// a soup that does not weld, or the cells of a volume mesh.
+    pub max_components: usize,
+}
+
+impl Default for RepairParams {
+    fn default() -> Self {
+        Self {
+            weld: true,
+            weld_tolerance: 0.0,
+            strict: false,
+            max_components: 256,
+        }
+    }
+}
+
+/// Why nothing at all can be made of an input.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RepairError {
+    /// No face is left.
+    #[error(
+        "none of the {faces} faces encloses any area, so there is no surface: check that the file holds triangles with distinct corners"
+    )]
+    NoFaces {
+        /// Faces of the input.
+        faces: usize,
+    },
+    /// A face names a vertex that does not exist.
+    #[error(
+        "face {face} names vertex {vertex}, but there are {vertices} vertices: correct the index"
+    )]
+    VertexOutOfRange {
+        /// Face.
+        face: usize,
+        /// The index it names.
+        vertex: u32,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// A coordinate is NaN or infinite.
+    #[error("vertex {vertex} has a coordinate that is not finite: correct it")]
+    NonFinitePosition {
+        /// Vertex.
+        vertex: usize,
+    },
+    /// A list has not one entry a face or corner.
+    #[error("{what} holds {given} numbers, but the faces need {required}: correct its length")]
+    WrongLength {
+        /// Which list.
+        what: String,
+        /// Its length.
+        given: usize,
+        /// The length that fits.
+        required: usize,
+    },
+    /// More faces than 32-bit indices can name.
+    #[error(
+        "{faces} faces are more than {most}, the most that 32-bit indices can name: split the model"
+    )]
+    TooManyFaces {
+        /// Given.
+        faces: usize,
+        /// Allowed.
+        most: usize,
+    },
+    /// The welding tolerance is out of range.
+    #[error(
+        "repair.weld_tolerance is {given}, but must be 0 (exactly equal positions) or from 1e-12 to 0.1 of the bounding box's diagonal"
+    )]
+    WeldTolerance {
+        /// Given.
+        given: f64,
+    },
+    /// The surface falls apart.
+    #[error(
+        "the repaired surface falls into {components} components, more than repair.max_components = {most}; repair found: {summary}; weld the mesh or take out inner walls, or raise the limit"
+    )]
+    TooManyComponents {
+        /// Components.
+        components: usize,
+        /// Allowed.
+        most: usize,
+        /// Counts of what repair changed.
+        summary: String,
+    },
+    /// `strict` is set and the input needs repair.
+    #[error(
+        "the mesh needs repair ({summary}; first: {first}), which repair.strict refuses: mend the file or set repair.strict = false"
+    )]
+    Strict {
+        /// Counts of what would change.
+        summary: String,
+        /// The first change.
+        first: String,
+    },
+}
+
+/// Why one component is no surface that can be built.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ComponentError {
+    /// No choice of sides is consistent.
+    #[error(
+        "the component of {faces} faces is one-sided like a Möbius strip: going round it, face {face} comes back turned over where it meets face {neighbour}; cut it open along a line across the strip, so that it has two sides"
+    )]
+    NonOrientable {
+        /// Source face at which the contradiction was found.
+        face: u32,
+        /// Its neighbour (source face).
+        neighbour: u32,
+        /// Number of faces of the component.
+        faces: usize,
+    },
+    /// The component could not be put together.
+    #[error("the component is no manifold surface: {0}")]
+    NotManifold(#[from] ConnectivityError),
+}
+
+/// One connected piece of the surface.
+#[derive(Clone, Debug)]
+pub struct Component {
+    /// The surface, with its own compact numbering of vertices and faces in input order.
+    pub mesh: Result<Mesh, ComponentError>,
+    /// Number of its faces before doubled edges were split.
+    pub faces: usize,
+    /// Lowest of its faces in the input.
+    pub first_source_face: u32,
+    /// Lowest of its vertices in the input.
+    pub first_source_vertex: u32,
+    /// The changes that concern it. Where there is one component only, all changes.
+    pub log: RepairLog,
+}
+
+/// Everything that repair leaves.
+#[derive(Clone, Debug)]
+pub struct Repaired {
+    /// In the order of their first face; at least one.
+    pub components: Vec<Component>,
+    /// All changes, those that concern no component included.
+    pub log: RepairLog,
+    /// For every vertex of the input: component and vertex there, or [`NONE`] twice.
+    pub(crate) places: Vec<[u32; 2]>,
+}
+
+impl Repaired {
+    /// Where a vertex of the input went: the component and its vertex there. For a welded vertex that is
+    /// the one that stands for all of them, for a split one the first copy. `None` where no
+    /// surviving face uses it, and where the input has no such vertex.
+    pub fn locate(&self, source_vertex: u32) -> Option<(usize, VertexId)> {
+        let [component, vertex] = *self.places.get(source_vertex as usize)?;
+        (component != NONE).then(|| (component as usize, VertexId::new(vertex as usize)))
+    }
+
+    /// Number of vertices of the input.
+    pub fn source_vertices(&self) -> usize {
+        self.places.len()
+    }
+}
+
+/// Repairs a soup; see the module docs.
+pub fn repair(soup: &Soup, params: &RepairParams) -> Result<Repaired, RepairError> {
+    check_input(soup, params)?;
+    let mut changes = Vec::new();
+    let stands_for = weld::weld(soup, params, &mut changes);
+    let draft = clean::clean(soup, &stands_for, &mut changes);
+    if draft.is_empty() {
+        return Err(RepairError::NoFaces {
+            faces: soup.faces.len(),
+        });
+    }
+    let gluing = glue::glue(&draft, &soup.positions, &mut changes);
+    let repaired = assemble::assemble(soup, &stands_for, &draft, &gluing, changes);
+    if repaired.components.len() > params.max_components {
+        return Err(RepairError::TooManyComponents {
+            components: repaired.components.len(),
+            most: params.max_components,
+            summary: repaired.log.summary(),
+        });
+    }
+    match repaired.log.first_refused_by_strict() {
+        Some(first) if params.strict => Err(RepairError::Strict {
+            summary: repaired.log.summary(),
+            first: first.to_string(),
+        }),
+        _ => Ok(repaired),
+    }
+}
+
+fn check_input(soup: &Soup, params: &RepairParams) -> Result<(), RepairError> {
+    let tolerance = params.weld_tolerance;
+    if tolerance != 0.0 && !(1e-12..=0.1).contains(&tolerance) {
+        return Err(RepairError::WeldTolerance { given: tolerance });
+    }
+    // Splits of slivers and doubled edges add a few faces: half the range leaves room.
+    let most = (NONE / 6) as usize;
+    if soup.faces.len() > most || soup.positions.len() > most {
+        let faces = soup.faces.len().max(soup.positions.len());
+        return Err(RepairError::TooManyFaces { faces, most });
+    }
+    let vertices = soup.positions.len();
+    for (face, corners) in soup.faces.iter().enumerate() {
+        if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= vertices) {
+            return Err(RepairError::VertexOutOfRange {
+                face,
+                vertex,
+                vertices,
+            });
+        }
+    }
+    let finite = |p: &[f64; 3]| p.iter().all(|x| x.is_finite());
+    if let Some(vertex) = soup.positions.iter().position(|p| !finite(p)) {
+        return Err(RepairError::NonFinitePosition { vertex });
+    }
+    let lengths = soup.attributes.iter().map(|a| {
+        let required = 3 * soup.faces.len() * a.components;
+        (format!("attribute {:?}", a.kind), a.values.len(), required)
+    });
+    let material = (
+        "the list of materials".to_string(),
+        soup.face_material.len(),
+        soup.faces.len(),
+    );
+    for (what, given, required) in std::iter::once(material).chain(lengths) {
+        if given != required {
+            return Err(RepairError::WrongLength {
+                what,
+                given,
+                required,
+            });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+pub(crate) mod corpus;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,138 @@
+//! Which vertices stand for which.
+//!
+//! Files cut a surface open wherever normals or texture coordinates jump, and some store every triangle
+//! on its own. Joining all vertices at equal positions would mend both, but would also join closed
+//! sheets that only touch. So a vertex is welded only where it lies on an open edge (an edge of one
+//! face) of the file's own connectivity: a vertex whose fans are all complete lacks nothing. Ends of one edge
+//! at one position are joined in any case, since no metric has an edge of length zero.
+
+use crate::geometry::mesh::{Soup, bounding_box, distance};
+use crate::repair::RepairParams;
+use crate::repair::log::Change;
+use std::collections::HashMap;
+
+/// For every vertex the one that stands for it (itself, or a lower index at the same position);
+/// adds a change for each that is gone and for each that no face uses.
+pub fn weld(soup: &Soup, params: &RepairParams, changes: &mut Vec<Change>) -> Vec<u32> {
+    let mut stands_for: Vec<u32> = (0..soup.positions.len() as u32).collect();
+    if params.weld {
+        let open = open_vertices(soup);
+        if params.weld_tolerance > 0.0 {
+            let (low, high) = bounding_box(&soup.positions);
+            let radius = params.weld_tolerance * distance(low, high);
+            weld_within(&soup.positions, &open, radius, low, &mut stands_for);
+        } else {
+            weld_equal(&soup.positions, &open, &mut stands_for);
+        }
+    }
+    for face in &soup.faces {
+        for k in 0..3 {
+            let (a, b) = (face[k], face[(k + 1) % 3]);
+            if soup.positions[a as usize] == soup.positions[b as usize] {
+                join(&mut stands_for, a, b);
+            }
+        }
+    }
+    let mut used = vec![false; soup.positions.len()];
+    for &v in soup.faces.iter().flatten() {
+        used[v as usize] = true;
+    }
+    for v in 0..stands_for.len() as u32 {
+        let onto = root(&mut stands_for, v);
+        stands_for[v as usize] = onto;
+        if onto != v {
+            changes.push(Change::WeldedVertex { vertex: v, onto });
+        } else if !used[v as usize] {
+            changes.push(Change::UnreferencedVertex { vertex: v });
+        }
+    }
+    stands_for
+}
+
+/// Every vertex on an edge that has one face only.
+fn open_vertices(soup: &Soup) -> Vec<bool> {
+    let mut edges: Vec<(u32, u32)> = soup
+        .faces
+        .iter()
+        .flat_map(|f| (0..3).map(|k| (f[k], f[(k + 1) % 3])))
+        .filter(|(a, b)| a != b)
+        .map(|(a, b)| (a.min(b), a.max(b)))
+        .collect();
+    edges.sort_unstable();
+    let mut open = vec![false; soup.positions.len()];
+    for same in edges.chunk_by(|a, b| a == b) {
+        if same.len() == 1 {
+            open[same[0].0 as usize] = true;
+            open[same[0].1 as usize] = true;
+        }
+    }
+    open
+}
+
+fn weld_equal(positions: &[[f64; 3]], open: &[bool], stands_for: &mut [u32]) {
+    // Adding 0 turns −0 into 0, so that equal positions have equal bits.
+    let bits = |v: u32| positions[v as usize].map(|x| (x + 0.0).to_bits());
+    let mut order: Vec<u32> = (0..positions.len() as u32)
+        .filter(|&v| open[v as usize])
+        .collect();
+    order.sort_unstable_by_key(|&v| (bits(v), v));
+    for same in order.chunk_by(|&a, &b| bits(a) == bits(b)) {
+        for &v in &same[1..] {
+            stands_for[v as usize] = same[0];
+        }
+    }
+}
+
+/// Each vertex is welded to the lowest earlier survivor within the radius; not transitively, so no
+/// chain of close vertices collapses to a point.
+fn weld_within(
+    positions: &[[f64; 3]],
+    open: &[bool],
+    radius: f64,
+    low: [f64; 3],
+    stands_for: &mut [u32],
+) {
+    if radius <= 0.0 {
+        return weld_equal(positions, open, stands_for);
+    }
+    let cell = |p: [f64; 3]| -> [i64; 3] {
+        std::array::from_fn(|i| ((p[i] - low[i]) / radius).floor() as i64)
+    };
+    let mut survivors: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
+    for v in (0..positions.len()).filter(|&v| open[v]) {
+        let (p, home) = (positions[v], cell(positions[v]));
+        let near = (0..27)
+            .map(|i| {
+                [
+                    home[0] + i % 3 - 1,
+                    home[1] + i / 3 % 3 - 1,
+                    home[2] + i / 9 - 1,
+                ]
+            })
+            .filter_map(|c| survivors.get(&c))
+            .flatten()
+            .copied()
+            .filter(|&s| distance(positions[s as usize], p) <= radius)
+            .min();
+        match near {
+            Some(s) => stands_for[v] = s,
+            None => survivors.entry(home).or_default().push(v as u32),
+        }
+    }
+}
+
+/// The vertex at the end of the chain, which is halved on the way.
+fn root(stands_for: &mut [u32], mut v: u32) -> u32 {
+    while stands_for[v as usize] != v {
+        let next = stands_for[v as usize];
+        stands_for[v as usize] = stands_for[next as usize];
+        v = next;
+    }
+    v
+}
+
+/// The lower root stands for both.
+fn join(stands_for: &mut [u32], a: u32, b: u32) {
+    let (a, b) = (root(stands_for, a), root(stands_for, b));
+    stands_for[a.max(b) as usize] = a.min(b);
+}
