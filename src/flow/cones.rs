@@ -1,0 +1,404 @@
+//! Which curvature every vertex shall have (tutorial 5.2).
+//!
+//! *Enters:* a mesh and what the user asks for. *Leaves:* a [`Prescription`] that meets
+//! Gauss–Bonnet (5), or an error with both totals.
+//!
+//! An asset may have several components, and Gauss–Bonnet holds for each: [`assign`] finds the component of every
+//! vertex and point that the user names, [`prescribe`] then works on one component. Without any wish:
+//!
+//! | component | cones |
+//! | --- | --- |
+//! | closed, genus 0 | 8 of π/2, spread (4 of π where there are fewer than 8 vertices) |
+//! | closed, genus 1 | none |
+//! | closed, genus g > 1 | 2g − 2 of −2π, spread |
+//! | with boundary | none; the boundary is free |
+//!
+//! A component to which a list names no cone is treated as if there were no list.
+//!
+//! *Guaranteed:* cone angles are positive, ΣK̄ = 2πχ (to rounding) unless the boundary is free, and then Σ over the interior
+//! exceeds 2πχ − π·(boundary vertices). *Not guaranteed:* that a circle packing with this curvature exists
+//! (constraint (6), see [`super::feasibility`]), nor that the cones keep the distortion low: [`spread`](ConeStrategy::Spread) knows distances only.
+
+mod boundary;
+mod error;
+mod pi_multiple;
+mod request;
+mod spread;
+
+pub use error::ConeError;
+pub(crate) use pi_multiple::in_pi;
+pub use pi_multiple::{NotAMultiple, PiMultiple};
+pub use request::{RequestedCone, Requests, assign};
+
+use crate::geometry::connectivity::Topology;
+use crate::geometry::ids::{VertexId, VertexVec};
+use crate::geometry::mesh::Mesh;
+use std::f64::consts::{PI, TAU};
+
+/// Largest miss of Gauss–Bonnet, radians, that counts as rounding of what the user wrote; it is then shared out
+/// among the cones.
+const GAUSS_BONNET_TOLERANCE: f64 = 1e-9;
+
+/// What happens on the boundary loops.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BoundaryCondition {
+    /// `u` stays where it is on the boundary; curvature falls where it falls (5.2).
+    #[default]
+    Free,
+    /// Every boundary vertex of a loop gets the same curvature (Fig. 9).
+    Uniform,
+    /// Four boundary vertices of a disk get π/2, the others 0: a rectangle.
+    Corners,
+}
+
+/// A vertex whose prescribed curvature is not zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cone {
+    /// Where.
+    pub vertex: VertexId,
+    /// Prescribed curvature K̄, radians.
+    pub curvature: f64,
+}
+
+/// The curvature that the flow must reach.
+#[derive(Clone, Debug)]
+pub struct Prescription {
+    /// K̄ of every vertex, radians. Zero and without meaning at boundary vertices where the boundary is free.
+    pub target: VertexVec<f64>,
+    /// Every vertex with K̄ ≠ 0 (boundary vertices only where the boundary is not free), by vertex.
+    pub cones: Vec<Cone>,
+    /// What happens on the boundary. `Free` on closed surfaces, where it says nothing.
+    pub boundary: BoundaryCondition,
+}
+
+impl Prescription {
+    /// Lists the vertices with K̄ ≠ 0 as cones.
+    pub fn new(target: VertexVec<f64>, boundary: BoundaryCondition) -> Self {
+        let cones = target
+            .enumerate()
+            .filter(|(_, k)| **k != 0.0)
+            .map(|(vertex, &curvature)| Cone { vertex, curvature })
+            .collect();
+        Self {
+            target,
+            cones,
+            boundary,
+        }
+    }
+}
+
+/// How cones are chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ConeStrategy {
+    /// The list where there is one, else by genus and boundary; see the module docs.
+    #[default]
+    Auto,
+    /// Those of the list.
+    Listed,
+    /// All curvature at one interior vertex.
+    Single,
+    /// Equal cones, far from each other.
+    Spread,
+    /// No cones in the interior.
+    None,
+}
+
+/// A cone that the user names by vertex or by point.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConeSpec {
+    /// Vertex of the input file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vertex: Option<u32>,
+    /// A point in source units: the nearest vertex is taken.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub point: Option<[f64; 3]>,
+    /// K̄ in multiples of π.
+    pub curvature: PiMultiple,
+}
+
+/// Which cones.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ConeParams {
+    /// How they are chosen.
+    pub strategy: ConeStrategy,
+    /// Cones by name; not empty means strategy `listed`.
+    pub list: Vec<ConeSpec>,
+    /// Number of cones for `spread`, at least 1.
+    pub count: usize,
+    /// K̄ of each cone for `spread`, in multiples of π; absent: what Gauss–Bonnet leaves, in equal parts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub curvature: Option<PiMultiple>,
+    /// Vertex of the input file for `single`; absent: the most central one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vertex: Option<u32>,
+}
+
+impl Default for ConeParams {
+    fn default() -> Self {
+        Self {
+            strategy: ConeStrategy::Auto,
+            list: Vec::new(),
+            count: 8,
+            curvature: None,
+            vertex: None,
+        }
+    }
+}
+
+/// A corner that the user names by vertex or by point.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CornerSpec {
+    /// Vertex of the input file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vertex: Option<u32>,
+    /// A point in source units: the nearest boundary vertex is taken.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub point: Option<[f64; 3]>,
+}
+
+/// What happens on the boundary.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BoundaryParams {
+    /// Absent: `corners` where corners are named, `uniform` where totals are given, else `free`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub condition: Option<BoundaryCondition>,
+    /// For `uniform`: total curvature of each loop, in multiples of π, loops in the order of their first face in the file.
+    /// Empty: the same curvature at every boundary vertex.
+    pub totals: Vec<PiMultiple>,
+    /// For `corners`: four boundary vertices. Empty: four that divide the boundary's length best.
+    pub corners: Vec<CornerSpec>,
+}
+
+impl BoundaryParams {
+    /// The condition on a component that has a boundary.
+    pub fn effective_condition(&self) -> BoundaryCondition {
+        let implied = match (self.corners.is_empty(), self.totals.is_empty()) {
+            (false, _) => BoundaryCondition::Corners,
+            (true, false) => BoundaryCondition::Uniform,
+            (true, true) => BoundaryCondition::Free,
+        };
+        self.condition.unwrap_or(implied)
+    }
+}
+
+/// The target curvature of one component; `requests` are those that [`assign`] found for it.
+pub fn prescribe(
+    mesh: &Mesh,
+    requests: &Requests,
+    cones: &ConeParams,
+    boundary: &BoundaryParams,
+) -> Result<Prescription, ConeError> {
+    let topology = mesh.connectivity.topology();
+    let condition = if topology.boundary_loops == 0 {
+        BoundaryCondition::Free
+    } else {
+        boundary.effective_condition()
+    };
+    let mut target = VertexVec::filled(0.0, mesh.connectivity.vertex_count());
+    let mut is_cone = VertexVec::filled(None, mesh.connectivity.vertex_count());
+    let on_boundary = boundary::prescribed_total(&topology, condition, boundary)?;
+    for cone in choose(mesh, &topology, requests, cones, on_boundary)? {
+        let v = cone.vertex;
+        let source = mesh.source_vertex[v];
+        if let Some(first) = is_cone[v].replace(cone.named) {
+            return Err(ConeError::Twice {
+                first,
+                second: cone.named,
+                vertex: source,
+            });
+        }
+        if cone.curvature == 0.0 {
+            return Err(ConeError::ZeroCurvature { vertex: cone.named });
+        }
+        if mesh.connectivity.is_boundary_vertex(v) && condition != BoundaryCondition::Uniform {
+            return Err(match condition {
+                BoundaryCondition::Corners => ConeError::OnCornerBoundary { vertex: cone.named },
+                _ => ConeError::OnFreeBoundary { vertex: cone.named },
+            });
+        }
+        target[v] = cone.curvature;
+    }
+    boundary::prescribe(mesh, &topology, requests, condition, boundary, &mut target)?;
+    check_angles(mesh, &target)?;
+    check_total(mesh, &topology, condition, &mut target)?;
+    Ok(Prescription::new(target, condition))
+}
+
+/// The cones that the user names or the strategy yields.
+fn choose(
+    mesh: &Mesh,
+    topology: &Topology,
+    requests: &Requests,
+    params: &ConeParams,
+    on_boundary: f64,
+) -> Result<Vec<RequestedCone>, ConeError> {
+    let total = TAU * topology.euler_characteristic as f64 - on_boundary;
+    match params.strategy {
+        ConeStrategy::Auto | ConeStrategy::Listed if !requests.cones.is_empty() => {
+            Ok(requests.cones.clone())
+        }
+        ConeStrategy::None => Ok(Vec::new()),
+        ConeStrategy::Auto | ConeStrategy::Listed => {
+            let vertices = mesh.connectivity.vertex_count();
+            let (count, curvature) = match topology.euler_characteristic {
+                _ if topology.boundary_loops > 0 => (0, 0.0),
+                2.. if vertices < 8 => (4, PI),
+                2.. => (8, PI / 2.0),
+                chi => (usize::try_from(-chi).unwrap_or(0), -TAU),
+            };
+            spread_cones(mesh, count, curvature)
+        }
+        ConeStrategy::Spread => {
+            if params.count == 0 {
+                return Err(ConeError::NoCount);
+            }
+            let share = total / params.count as f64;
+            let curvature = params.curvature.map_or(share, PiMultiple::radians);
+            if curvature == 0.0 {
+                return Err(ConeError::NothingToSpread {
+                    count: params.count,
+                    chi: topology.euler_characteristic,
+                });
+            }
+            spread_cones(mesh, params.count, curvature)
+        }
+        ConeStrategy::Single if total == 0.0 => Ok(Vec::new()),
+        ConeStrategy::Single => {
+            if total >= TAU - GAUSS_BONNET_TOLERANCE {
+                return Err(ConeError::SingleTooLarge {
+                    required: total,
+                    chi: topology.euler_characteristic,
+                });
+            }
+            let none = ConeError::TooFewVertices {
+                wanted: 1,
+                interior: 0,
+            };
+            let vertex = requests.single.or_else(|| spread::central(mesh));
+            let vertex = vertex.ok_or(none)?;
+            Ok(vec![RequestedCone {
+                vertex,
+                named: mesh.source_vertex[vertex],
+                curvature: total,
+            }])
+        }
+    }
+}
+
+fn spread_cones(
+    mesh: &Mesh,
+    count: usize,
+    curvature: f64,
+) -> Result<Vec<RequestedCone>, ConeError> {
+    let connectivity = &mesh.connectivity;
+    let interior = connectivity
+        .vertices()
+        .filter(|&v| !connectivity.is_boundary_vertex(v))
+        .count();
+    // Before the search, which would visit every vertex in vain.
+    let refused = ConeError::TooFewVertices {
+        wanted: count,
+        interior,
+    };
+    if interior < count {
+        return Err(refused);
+    }
+    let vertices = spread::spread(mesh, count);
+    if vertices.len() < count {
+        return Err(refused);
+    }
+    let cone = |vertex: VertexId| RequestedCone {
+        vertex,
+        named: mesh.source_vertex[vertex],
+        curvature,
+    };
+    Ok(vertices.into_iter().map(cone).collect())
+}
+
+/// Cone angles are positive: K̄ < 2π in the interior, K̄ < π on the boundary.
+fn check_angles(mesh: &Mesh, target: &VertexVec<f64>) -> Result<(), ConeError> {
+    for (v, &curvature) in target.enumerate() {
+        let on_boundary = mesh.connectivity.is_boundary_vertex(v);
+        let bound = if on_boundary { PI } else { TAU };
+        if curvature >= bound - GAUSS_BONNET_TOLERANCE {
+            return Err(ConeError::NoAngleLeft {
+                vertex: mesh.source_vertex[v],
+                curvature,
+                bound,
+                place: if on_boundary {
+                    "on the boundary"
+                } else {
+                    "in the interior"
+                },
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Gauss–Bonnet (5), or its counterpart for a free boundary.
+fn check_total(
+    mesh: &Mesh,
+    topology: &Topology,
+    condition: BoundaryCondition,
+    target: &mut VertexVec<f64>,
+) -> Result<(), ConeError> {
+    let chi = topology.euler_characteristic;
+    let required = TAU * chi as f64;
+    let given: f64 = target.iter().sum();
+    let cones = target.iter().filter(|k| **k != 0.0).count();
+    if topology.boundary_loops > 0 && condition == BoundaryCondition::Free {
+        let boundary_vertices = mesh
+            .connectivity
+            .vertices()
+            .filter(|&v| mesh.connectivity.is_boundary_vertex(v))
+            .count();
+        let bound = required - PI * boundary_vertices as f64;
+        if given <= bound + GAUSS_BONNET_TOLERANCE {
+            return Err(ConeError::FreeBoundaryTotal {
+                given,
+                bound,
+                chi,
+                boundary_vertices,
+            });
+        }
+        return Ok(());
+    }
+    if topology.boundary_loops == 0 && cones == 0 && chi != 0 {
+        return Err(ConeError::NeedsCones {
+            chi,
+            genus: topology.genus,
+            required,
+        });
+    }
+    if topology.boundary_loops == 0 && chi == 2 && cones < 3 {
+        return Err(ConeError::TooFewOnSphere { cones });
+    }
+    if (given - required).abs() > GAUSS_BONNET_TOLERANCE {
+        return Err(ConeError::GaussBonnet {
+            given,
+            required,
+            chi,
+            genus: topology.genus,
+            boundary_loops: topology.boundary_loops,
+        });
+    }
+    // Rounding of the sum itself is no miss: what was written exactly stays exact.
+    let rounding = 1e-15 * (1.0 + target.iter().map(|k| k.abs()).sum::<f64>());
+    if cones > 0 && (required - given).abs() > rounding {
+        let share = (required - given) / cones as f64;
+        for k in target.as_mut_slice().iter_mut().filter(|k| **k != 0.0) {
+            *k += share;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,257 @@
+//! Why a prescription is refused. Vertices are those of the input file, angles are radians.
+
+use super::pi_multiple::in_pi;
+
+/// Why there is no target curvature; vertices are those of the input file.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ConeError {
+    /// Two entries name one vertex.
+    #[error("{}", twice(*first, *second, *vertex))]
+    Twice {
+        /// As the first entry names it.
+        first: u32,
+        /// As the second entry names it.
+        second: u32,
+        /// The surviving vertex.
+        vertex: u32,
+    },
+    /// The file has no such vertex.
+    #[error("{key} names vertex {vertex}, but the file has {vertices} vertices (0 to {}): correct the index", vertices.saturating_sub(1))]
+    OutOfRange {
+        /// Where in the configuration.
+        key: String,
+        /// Given.
+        vertex: u32,
+        /// Vertices of the file.
+        vertices: usize,
+    },
+    /// No surviving face uses the vertex.
+    #[error(
+        "{key} names vertex {vertex}, which no face of the repaired surface uses: name another vertex or a point"
+    )]
+    NotOnSurface {
+        /// Where in the configuration.
+        key: String,
+        /// Given.
+        vertex: u32,
+    },
+    /// An entry has neither vertex nor point, or both.
+    #[error("{key} must have either a vertex or a point")]
+    NoPlace {
+        /// Where in the configuration.
+        key: String,
+    },
+    /// A point is not finite.
+    #[error("{key}.point has a coordinate that is not finite: correct it")]
+    NonFinitePoint {
+        /// Where in the configuration.
+        key: String,
+    },
+    /// Two keys that exclude each other.
+    #[error("{first} and {second} exclude each other: remove one of them")]
+    Conflict {
+        /// A key with its value.
+        first: String,
+        /// Another one.
+        second: String,
+    },
+    /// `listed` without a list.
+    #[error(
+        "cones.strategy is \"listed\", but cones.list is empty: add cones or choose another strategy"
+    )]
+    EmptyList,
+    /// `spread` of no cones.
+    #[error("cones.count is 0: give at least 1 cone, or set cones.strategy = \"none\"")]
+    NoCount,
+    /// A cone of curvature 0.
+    #[error(
+        "vertex {vertex} is listed as a cone of curvature 0, which is no cone: remove the entry or give its curvature"
+    )]
+    ZeroCurvature {
+        /// Vertex.
+        vertex: u32,
+    },
+    /// `spread` where the total is 0.
+    #[error(
+        "{count} cones were asked for, but with χ = {chi} there is no curvature left to share out: set cones.strategy = \"none\" or give cones.list"
+    )]
+    NothingToSpread {
+        /// Cones wanted.
+        count: usize,
+        /// Euler characteristic.
+        chi: i64,
+    },
+    /// A cone at a vertex whose curvature nobody prescribes.
+    #[error(
+        "vertex {vertex} lies on a free boundary, where no curvature can be prescribed: move the cone inside or set boundary.condition = \"uniform\""
+    )]
+    OnFreeBoundary {
+        /// Vertex.
+        vertex: u32,
+    },
+    /// A cone on the border of a rectangle.
+    #[error(
+        "vertex {vertex} lies on the boundary, whose curvature boundary.condition = \"corners\" prescribes: move the cone inside or set the condition to \"uniform\""
+    )]
+    OnCornerBoundary {
+        /// Vertex.
+        vertex: u32,
+    },
+    /// The cone angle would not be positive.
+    #[error(
+        "vertex {vertex} has curvature {} ({curvature:.6} rad), but {place} it must be less than {} ({bound:.6} rad), so that an angle remains: lower it or spread it over more cones",
+        in_pi(*curvature),
+        in_pi(*bound)
+    )]
+    NoAngleLeft {
+        /// Vertex, or 2³²−1 for one that repair made.
+        vertex: u32,
+        /// K̄, radians.
+        curvature: f64,
+        /// 2π or π.
+        bound: f64,
+        /// Interior or boundary.
+        place: &'static str,
+    },
+    /// Fewer than three cones on a sphere.
+    #[error(
+        "a closed surface of genus 0 needs at least 3 cones, because each has less than 2π of the 4π required, but {cones} were given: add cones"
+    )]
+    TooFewOnSphere {
+        /// Given.
+        cones: usize,
+    },
+    /// One cone cannot take all the curvature.
+    #[error(
+        "a single cone would need curvature {} (2πχ with χ = {chi}, less what the boundary takes), but a cone has less than 2π: set cones.strategy = \"spread\"",
+        in_pi(*required)
+    )]
+    SingleTooLarge {
+        /// Required, radians.
+        required: f64,
+        /// Euler characteristic.
+        chi: i64,
+    },
+    /// Closed, curved, and no cones.
+    #[error(
+        "a closed surface of genus {genus} (χ = {chi}) needs cones of total curvature {}, but there are none: set cones.strategy = \"auto\" or \"spread\", or list cones",
+        in_pi(*required)
+    )]
+    NeedsCones {
+        /// Euler characteristic.
+        chi: i64,
+        /// Genus.
+        genus: i64,
+        /// 2πχ, radians.
+        required: f64,
+    },
+    /// Not enough interior vertices.
+    #[error(
+        "{wanted} cones were asked for, but the component has {interior} interior vertices: ask for fewer or refine the mesh"
+    )]
+    TooFewVertices {
+        /// Cones wanted.
+        wanted: usize,
+        /// Interior vertices.
+        interior: usize,
+    },
+    /// The prescription misses (5).
+    #[error(
+        "the prescribed curvatures sum to {} ({given:.9} rad), but Gauss–Bonnet requires 2πχ = {} ({required:.9} rad) on a surface with χ = {chi} (genus {genus}, {boundary_loops} boundary loops): change the total by {}",
+        in_pi(*given),
+        in_pi(*required),
+        in_pi(*required - *given)
+    )]
+    GaussBonnet {
+        /// ΣK̄, radians.
+        given: f64,
+        /// 2πχ, radians.
+        required: f64,
+        /// Euler characteristic.
+        chi: i64,
+        /// Genus.
+        genus: i64,
+        /// Boundary loops.
+        boundary_loops: usize,
+    },
+    /// A free boundary cannot make up for what the interior lacks.
+    #[error(
+        "the interior curvatures sum to {} ({given:.6} rad), but with a free boundary of {boundary_vertices} vertices and χ = {chi} they must exceed 2πχ − {boundary_vertices}π = {} ({bound:.6} rad): raise the total or refine the boundary",
+        in_pi(*given),
+        in_pi(*bound)
+    )]
+    FreeBoundaryTotal {
+        /// Σ over the interior, radians.
+        given: f64,
+        /// Lower bound, excluded, radians.
+        bound: f64,
+        /// Euler characteristic.
+        chi: i64,
+        /// Number of boundary vertices.
+        boundary_vertices: usize,
+    },
+    /// Not one total a loop.
+    #[error(
+        "boundary.totals has {given} entries, but the component has {loops} boundary loops: give one total a loop"
+    )]
+    TotalsCount {
+        /// Entries.
+        given: usize,
+        /// Boundary loops.
+        loops: usize,
+    },
+    /// `corners` on something that is no disk.
+    #[error(
+        "boundary.condition = \"corners\" needs a disk (genus 0, 1 boundary loop), but the component has genus {genus} and {loops} boundary loops: use \"free\" or \"uniform\""
+    )]
+    NotADisk {
+        /// Genus.
+        genus: i64,
+        /// Boundary loops.
+        loops: usize,
+    },
+    /// Not four corners.
+    #[error(
+        "a rectangle has 4 corners, but boundary.corners names {given}: name 4, or none to have them chosen"
+    )]
+    CornerCount {
+        /// Given.
+        given: usize,
+    },
+    /// A corner in the interior.
+    #[error(
+        "boundary.corners names vertex {vertex}, which does not lie on the boundary: name a boundary vertex or a point"
+    )]
+    CornerInside {
+        /// Vertex.
+        vertex: u32,
+    },
+    /// A corner twice.
+    #[error("{}", twice(*first, *second, *vertex))]
+    CornerTwice {
+        /// As the first entry names it.
+        first: u32,
+        /// As the second entry names it.
+        second: u32,
+        /// The surviving vertex.
+        vertex: u32,
+    },
+    /// The boundary is too short.
+    #[error(
+        "a rectangle needs 4 boundary vertices, but the boundary has {given}: refine it or use another condition"
+    )]
+    BoundaryTooShort {
+        /// Boundary vertices.
+        given: usize,
+    },
+}
+
+fn twice(first: u32, second: u32, vertex: u32) -> String {
+    if first == second {
+        format!("vertex {first} is named twice: remove one of the entries")
+    } else {
+        format!(
+            "vertices {first} and {second} are both named, but they are one vertex of the repaired surface (that of vertex {vertex}): remove one of the entries"
+        )
+    }
+}

@@ -1,0 +1,179 @@
+//! Which component, and which of its vertices, the user means.
+
+use super::{BoundaryCondition, BoundaryParams, ConeError, ConeParams, ConeStrategy, spread};
+use crate::geometry::ids::{NONE, VertexId};
+use crate::geometry::mesh::{Mesh, distance};
+use crate::repair::Repaired;
+
+/// A cone at a vertex of a component.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RequestedCone {
+    /// Where.
+    pub vertex: VertexId,
+    /// The vertex of the input file that was named (or that a point or a strategy found).
+    pub named: u32,
+    /// K̄, radians.
+    pub curvature: f64,
+}
+
+/// What the user named on one component.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Requests {
+    /// Cones of the list.
+    pub cones: Vec<RequestedCone>,
+    /// Vertex for `single`.
+    pub single: Option<VertexId>,
+    /// Corners: vertex, and how the input names it.
+    pub corners: Vec<(VertexId, u32)>,
+}
+
+/// Finds the component and vertex of everything that the user names: one [`Requests`] a component, in their order.
+/// What lies on a component that could not be repaired is left out, since nothing is built of it.
+pub fn assign(
+    repaired: &Repaired,
+    cones: &ConeParams,
+    boundary: &BoundaryParams,
+) -> Result<Vec<Requests>, ConeError> {
+    check_keys(cones, boundary)?;
+    let mut requests = vec![Requests::default(); repaired.components.len()];
+    for (i, spec) in cones.list.iter().enumerate() {
+        let key = format!("cones.list[{i}]");
+        let place = find(repaired, &key, spec.vertex, spec.point, |_, _| true)?;
+        if let Some((component, vertex, named)) = place {
+            requests[component].cones.push(RequestedCone {
+                vertex,
+                named,
+                curvature: spec.curvature.radians(),
+            });
+        }
+    }
+    if let Some(vertex) = cones.vertex {
+        let key = "cones.vertex";
+        if let Some((component, vertex, _)) = find(repaired, key, Some(vertex), None, |_, _| true)?
+        {
+            requests[component].single = Some(vertex);
+        }
+    }
+    for (i, spec) in boundary.corners.iter().enumerate() {
+        let key = format!("boundary.corners[{i}]");
+        let on_boundary = |mesh: &Mesh, v| mesh.connectivity.is_boundary_vertex(v);
+        let place = find(repaired, &key, spec.vertex, spec.point, on_boundary)?;
+        if let Some((component, vertex, named)) = place {
+            requests[component].corners.push((vertex, named));
+        }
+    }
+    Ok(requests)
+}
+
+/// Keys that say two different things.
+fn check_keys(cones: &ConeParams, boundary: &BoundaryParams) -> Result<(), ConeError> {
+    let conflict = |first: &str, second: String| {
+        Err(ConeError::Conflict {
+            first: first.into(),
+            second,
+        })
+    };
+    let name = |strategy: ConeStrategy| format!("cones.strategy = \"{}\"", strategy.name());
+    match cones.strategy {
+        ConeStrategy::Auto => {}
+        ConeStrategy::Listed if cones.list.is_empty() => return Err(ConeError::EmptyList),
+        ConeStrategy::Listed => {}
+        other if !cones.list.is_empty() => return conflict("cones.list", name(other)),
+        _ => {}
+    }
+    if cones.vertex.is_some() && cones.strategy != ConeStrategy::Single {
+        return conflict("cones.vertex", name(cones.strategy));
+    }
+    if cones.curvature.is_some() && cones.strategy != ConeStrategy::Spread {
+        return conflict("cones.curvature", name(cones.strategy));
+    }
+    let condition = boundary.effective_condition();
+    let shown = format!("boundary.condition = \"{}\"", condition.name());
+    if !boundary.totals.is_empty() && condition != BoundaryCondition::Uniform {
+        return conflict("boundary.totals", shown);
+    }
+    if !boundary.corners.is_empty() && condition != BoundaryCondition::Corners {
+        return conflict("boundary.corners", shown);
+    }
+    Ok(())
+}
+
+impl ConeStrategy {
+    /// As the configuration writes it.
+    pub fn name(self) -> &'static str {
+        match self {
+            ConeStrategy::Auto => "auto",
+            ConeStrategy::Listed => "listed",
+            ConeStrategy::Single => "single",
+            ConeStrategy::Spread => "spread",
+            ConeStrategy::None => "none",
+        }
+    }
+}
+
+impl BoundaryCondition {
+    /// As the configuration and the output write it.
+    pub fn name(self) -> &'static str {
+        match self {
+            BoundaryCondition::Free => "free",
+            BoundaryCondition::Uniform => "uniform",
+            BoundaryCondition::Corners => "corners",
+        }
+    }
+}
+
+/// Component, vertex and source vertex of a place; `None` where its component failed.
+fn find(
+    repaired: &Repaired,
+    key: &str,
+    vertex: Option<u32>,
+    point: Option<[f64; 3]>,
+    candidate: impl Fn(&Mesh, VertexId) -> bool,
+) -> Result<Option<(usize, VertexId, u32)>, ConeError> {
+    let key = || key.to_string();
+    match (vertex, point) {
+        (Some(vertex), None) => {
+            let vertices = repaired.source_vertices();
+            if vertex as usize >= vertices {
+                return Err(ConeError::OutOfRange {
+                    key: key(),
+                    vertex,
+                    vertices,
+                });
+            }
+            let (component, v) = repaired
+                .locate(vertex)
+                .ok_or_else(|| ConeError::NotOnSurface { key: key(), vertex })?;
+            let built = repaired.components[component].mesh.is_ok();
+            Ok(built.then_some((component, v, vertex)))
+        }
+        (None, Some(point)) if point.iter().all(|x| x.is_finite()) => {
+            Ok(nearest(repaired, point, candidate))
+        }
+        (None, Some(_)) => Err(ConeError::NonFinitePoint { key: key() }),
+        _ => Err(ConeError::NoPlace { key: key() }),
+    }
+}
+
+/// The candidate nearest to a point; the one with the lowest coordinates, then the lowest number, where there are several.
+fn nearest(
+    repaired: &Repaired,
+    point: [f64; 3],
+    candidate: impl Fn(&Mesh, VertexId) -> bool,
+) -> Option<(usize, VertexId, u32)> {
+    let meshes = repaired.components.iter().enumerate();
+    meshes
+        .filter_map(|(c, component)| Some((c, component.mesh.as_ref().ok()?)))
+        .flat_map(|(c, mesh)| {
+            mesh.positions
+                .enumerate()
+                .map(move |(v, p)| (c, mesh, v, *p))
+        })
+        // Only vertices of the file: a name for the message is needed.
+        .filter(|&(_, mesh, v, _)| mesh.source_vertex[v] != NONE && candidate(mesh, v))
+        .min_by(|a, b| {
+            let by_distance = distance(a.3, point).total_cmp(&distance(b.3, point));
+            by_distance.then(spread::by_position(a.3, b.3))
+        })
+        .map(|(c, mesh, v, _)| (c, v, mesh.source_vertex[v]))
+}

@@ -1,0 +1,271 @@
+//! Both sides of (6) for one vertex set, and the sets that break it.
+
+use super::{ROOM, Violation, transport};
+use crate::flow::cones::BoundaryCondition;
+use crate::flow::metric::full_angles;
+use crate::geometry::connectivity::Connectivity;
+use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, HalfedgeId, VertexId, VertexVec};
+use std::f64::consts::PI;
+
+/// Which side of the constraint is broken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Too little curvature: the cone angles do not fit into the faces around.
+    Below,
+    /// Too much curvature: the faces around have no room for so small cone angles.
+    Above,
+}
+
+/// Vertices, connected by faces, that break (6).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Region {
+    /// The vertices, ascending.
+    pub vertices: Vec<VertexId>,
+    /// Which way it fails.
+    pub side: Side,
+    /// How much room is left, radians: zero or negative, but for rounding.
+    pub slack: f64,
+}
+
+/// Both slacks of one set, radians; (6) holds for it where both are positive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slack {
+    /// g(I) = Σ_faces h − Σ_I Θ.
+    pub upper: f64,
+    /// Σ_I Θ − Σ_faces h'.
+    pub lower: f64,
+}
+
+/// (6) for one connectivity, Φ and prescription.
+pub struct Constraint<'a> {
+    connectivity: &'a Connectivity,
+    phi: Option<&'a EdgeVec<f64>>,
+    target: &'a VertexVec<f64>,
+    free_boundary: bool,
+    margin: f64,
+    full_angle: VertexVec<f64>,
+    vertex_mark: VertexVec<u32>,
+    face_mark: FaceVec<u32>,
+    mark: u32,
+}
+
+impl<'a> Constraint<'a> {
+    /// `phi`: intersection angles, radians in [0, π/2]; `None` for Φ ≡ 0. `target`: K̄, radians, one a vertex.
+    /// `margin`: ρ of [the module docs](super), 1 to 2; 1 is (6).
+    pub fn new(
+        connectivity: &'a Connectivity,
+        phi: Option<&'a EdgeVec<f64>>,
+        target: &'a VertexVec<f64>,
+        boundary: BoundaryCondition,
+        margin: f64,
+    ) -> Self {
+        Self {
+            connectivity,
+            phi,
+            target,
+            free_boundary: boundary == BoundaryCondition::Free,
+            margin,
+            full_angle: full_angles(connectivity),
+            vertex_mark: VertexVec::filled(0, connectivity.vertex_count()),
+            face_mark: FaceVec::filled(0, connectivity.face_count()),
+            mark: 0,
+        }
+    }
+
+    pub(super) fn connectivity(&self) -> &'a Connectivity {
+        self.connectivity
+    }
+
+    /// False where curvature is not prescribed: on a free boundary.
+    pub fn is_prescribed(&self, v: VertexId) -> bool {
+        !(self.free_boundary && self.connectivity.is_boundary_vertex(v))
+    }
+
+    /// ρ times the cone angle of a prescribed vertex, radians.
+    pub(super) fn wanted(&self, v: VertexId) -> f64 {
+        self.margin * (self.full_angle[v] - self.target[v])
+    }
+
+    /// Most that the corner at the tail of a halfedge can hold, radians.
+    pub fn corner_room(&self, h: HalfedgeId) -> f64 {
+        let opposite = self.connectivity.edge(self.connectivity.next(h));
+        let phi = self.phi.map_or(0.0, |phi| phi[opposite]);
+        (PI - phi).max(0.5 * self.face_room())
+    }
+
+    /// What the three corners of a face hold together, radians.
+    pub fn face_room(&self) -> f64 {
+        self.margin * PI
+    }
+
+    /// Slacks of any set of prescribed vertices; a vertex named twice counts once.
+    pub fn slack(&mut self, set: &[VertexId]) -> Slack {
+        self.mark += 1;
+        let mark = self.mark;
+        let mut wanted = 0.0;
+        for &v in set {
+            if self.vertex_mark[v] != mark {
+                self.vertex_mark[v] = mark;
+                wanted += self.wanted(v);
+            }
+        }
+        let (mut most, mut least) = (0.0, 0.0);
+        let whole = self.face_room();
+        for &v in set {
+            for h in self.connectivity.outgoing(v) {
+                let face = self.connectivity.face(h);
+                if self.face_mark[face] == mark {
+                    continue;
+                }
+                self.face_mark[face] = mark;
+                let corners = self.connectivity.face_halfedges(face);
+                let inside = corners.map(|h| self.vertex_mark[self.connectivity.tail(h)] == mark);
+                // What the one corner holds that differs from the other two, if any.
+                let odd = |value: bool| {
+                    let corner = inside.iter().position(|&i| i == value);
+                    corner.map_or(0.0, |k| self.corner_room(corners[k]))
+                };
+                match inside.iter().filter(|&&i| i).count() {
+                    1 => most += odd(true),
+                    2 => {
+                        most += whole;
+                        least += whole - odd(false);
+                    }
+                    _ => {
+                        most += whole;
+                        least += whole;
+                    }
+                }
+            }
+        }
+        Slack {
+            upper: most - wanted,
+            lower: wanted - least,
+        }
+    }
+
+    /// The set as a region, where it breaks (6).
+    fn region(&mut self, vertices: Vec<VertexId>, side: Side) -> Option<Region> {
+        let slack = self.slack(&vertices);
+        let slack = match side {
+            Side::Below => slack.upper,
+            Side::Above => slack.lower,
+        };
+        let c = self.connectivity;
+        let corners: usize = vertices.iter().map(|&v| c.outgoing(v).count()).sum();
+        (slack <= ROOM * (1 + corners) as f64).then_some(Region {
+            vertices,
+            side,
+            slack,
+        })
+    }
+
+    /// The first vertex that breaks (6) alone.
+    pub(super) fn first_offending_vertex(&mut self) -> Option<Region> {
+        // All of V is no proper subset.
+        if self.connectivity.vertex_count() < 2 {
+            return None;
+        }
+        let vertices = self.connectivity.vertices();
+        let sides = |v| [(v, Side::Below), (v, Side::Above)];
+        vertices
+            .filter(|&v| self.is_prescribed(v))
+            .flat_map(sides)
+            .collect::<Vec<_>>()
+            .into_iter()
+            .find_map(|(v, side)| self.region(vec![v], side))
+    }
+
+    /// The connected regions that break (6) together, most urgent kind first; none exactly where (6) holds.
+    ///
+    /// They are those of the *least* set with the least slack; where the least slack is zero, of one set that has it.
+    pub fn offending_regions(&mut self) -> Vec<Region> {
+        for set in transport::candidates(self) {
+            let regions = self.connected_regions(&set);
+            if !regions.is_empty() {
+                return regions;
+            }
+        }
+        Vec::new()
+    }
+
+    /// Splits a set into regions, or its complement where that is smaller or the set holds a free boundary.
+    fn connected_regions(&mut self, set: &VertexVec<bool>) -> Vec<Region> {
+        let c = self.connectivity;
+        let holds_free = (c.vertices()).any(|v| set[v] && !self.is_prescribed(v));
+        let leaves_free = (c.vertices()).any(|v| !set[v] && !self.is_prescribed(v));
+        let size = set.iter().filter(|&&x| x).count();
+        let complement = holds_free || (!leaves_free && 2 * size > set.len());
+        let side = match complement {
+            true => Side::Above,
+            false => Side::Below,
+        };
+        let mut waiting: VertexVec<bool> = set.iter().map(|&x| x != complement).collect();
+        let mut regions = Vec::new();
+        for start in c.vertices() {
+            if !std::mem::take(&mut waiting[start]) {
+                continue;
+            }
+            let mut vertices = vec![start];
+            let mut next = 0;
+            while let Some(&v) = vertices.get(next) {
+                next += 1;
+                // Vertices that share a face share an edge.
+                for w in c.neighbours(v) {
+                    if std::mem::take(&mut waiting[w]) {
+                        vertices.push(w);
+                    }
+                }
+            }
+            vertices.sort_unstable();
+            if vertices.len() < c.vertex_count() {
+                regions.extend(self.region(vertices, side));
+            }
+        }
+        regions
+    }
+
+    /// What to say about a region: both sides of (6), without the margin's factor.
+    pub(super) fn violation(&self, region: &Region) -> Violation {
+        let curvature: f64 = region.vertices.iter().map(|&v| self.target[v]).sum();
+        let slack = region.slack / self.margin;
+        let strength = |v: VertexId| match region.side {
+            Side::Below => -self.target[v],
+            Side::Above => self.target[v],
+        };
+        let strongest = (region.vertices.iter().copied())
+            .reduce(|a, b| if strength(b) > strength(a) { b } else { a });
+        Violation {
+            vertex: strongest.unwrap_or(VertexId::new(0)),
+            size: region.vertices.len(),
+            side: region.side,
+            curvature,
+            bound: match region.side {
+                Side::Below => curvature - slack,
+                Side::Above => curvature + slack,
+            },
+        }
+    }
+
+    /// The halfedges opposite to the set's side of (6): splitting one gives the region a corner more. They lie in faces with
+    /// one corner in the region for [`Side::Below`], with two for [`Side::Above`].
+    pub fn link(&self, region: &Region) -> Vec<HalfedgeId> {
+        let c = self.connectivity;
+        let inside = |v: VertexId| region.vertices.binary_search(&v).is_ok();
+        let mut faces: Vec<FaceId> = (region.vertices.iter())
+            .flat_map(|&v| c.outgoing(v).map(|h| c.face(h)))
+            .collect();
+        faces.sort_unstable();
+        faces.dedup();
+        let odd = region.side == Side::Below;
+        let opposite = |h: &HalfedgeId| {
+            let ends = [c.tail(*h), c.head(*h)];
+            inside(c.apex(*h)) == odd && ends.into_iter().all(|v| inside(v) != odd)
+        };
+        faces
+            .into_iter()
+            .flat_map(|f| c.face_halfedges(f))
+            .filter(opposite)
+            .collect()
+    }
+}

@@ -1,0 +1,80 @@
+//! Enough edges around *every* set of vertices: criterion 3 of [`super`].
+//!
+//! [`feasibility`](crate::flow::feasibility) finds the sets that lack edges, with a margin. Splitting an edge of a set's link
+//! gives it one edge more, and what that edge is worth, π − Φ of its halves, is taken to be what the whole was worth:
+//! exact for Φ ≡ 0, a guess otherwise, since Φ follows from the new lengths.
+//! For flat disks and Φ ≡ 0 a margin of 1.5 asks for a link of 3, which every disk has, so nothing far from the cones is touched.
+
+use super::{Editor, MARGIN, OutOfSplits};
+use crate::flow::feasibility::{Constraint, ROOM, Region};
+use crate::geometry::ids::{EdgeVec, HalfedgeId};
+
+/// Splits edges around offending sets until no set lacks edges for tangent circles.
+pub(super) fn widen(editor: &mut Editor) -> Result<(), OutOfSplits> {
+    loop {
+        let shortages = shortages(editor, None, MARGIN);
+        if shortages.is_empty() {
+            return Ok(());
+        }
+        for shortage in &shortages {
+            fill(editor, shortage)?;
+        }
+    }
+}
+
+/// A region that lacks edges, and what each edge of its link is worth.
+pub(super) struct Shortage {
+    region: Region,
+    /// Halfedges of the link, each with the room of the corner opposite, radians.
+    link: Vec<(HalfedgeId, f64)>,
+}
+
+/// The regions that break (6) with a margin. `phi` as for [`Constraint::new`].
+pub(super) fn shortages(editor: &Editor, phi: Option<&EdgeVec<f64>>, margin: f64) -> Vec<Shortage> {
+    let connectivity = &editor.mesh.connectivity;
+    let mut constraint =
+        Constraint::new(connectivity, phi, &editor.target, editor.boundary, margin);
+    let regions = constraint.offending_regions().into_iter();
+    let shortage = |region: Region| {
+        let link = constraint.link(&region).into_iter();
+        let worth = |h: HalfedgeId| constraint.corner_room(connectivity.prev(h));
+        Shortage {
+            link: link.map(|h| (h, worth(h))).collect(),
+            region,
+        }
+    };
+    // Without a link there is nothing to split.
+    regions
+        .map(shortage)
+        .filter(|s| !s.link.is_empty())
+        .collect()
+}
+
+/// Splits edges of the link, long ones first, until their worth makes up for what the region lacks; one at least.
+pub(super) fn fill(editor: &mut Editor, shortage: &Shortage) -> Result<(), OutOfSplits> {
+    let mut link = shortage.link.clone();
+    let mut lacking = ROOM - shortage.region.slack;
+    while lacking > 0.0 {
+        let longest = link
+            .iter()
+            .max_by(|(g, _), (h, _)| editor.by_length(*g, *h));
+        let Some(&(h, _)) = longest else { break };
+        let c = &editor.mesh.connectivity;
+        let twin = c.twin(h);
+        editor.split_edge(c.edge(h))?;
+        let c = &editor.mesh.connectivity;
+        // Each side kept its tail; its other half lies past the spoke.
+        for side in std::iter::once(h).chain(twin) {
+            let worth = link
+                .iter()
+                .find(|(g, _)| *g == side)
+                .map(|(_, worth)| *worth);
+            let past = c.twin(c.next(side)).map(|t| c.next(t));
+            if let (Some(worth), Some(past)) = (worth, past) {
+                link.push((past, worth));
+                lacking -= worth;
+            }
+        }
+    }
+    Ok(())
+}

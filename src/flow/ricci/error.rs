@@ -1,0 +1,174 @@
+//! Why the flow ends without a metric: every variant names what in the input is at fault, and what to change.
+
+use super::Scheme;
+use crate::flow::feasibility::Violation;
+use crate::flow::packing::PackingError;
+use crate::flow::solve::SolveError;
+use crate::geometry::ids::{EdgeId, FaceId, VertexId};
+
+/// Why there is no flat metric.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FlowError {
+    /// A list has another length than the connectivity.
+    #[error("{given} {what} were given for {needed}")]
+    Count {
+        /// What was counted.
+        what: &'static str,
+        /// How many were given.
+        given: usize,
+        /// How many are needed.
+        needed: usize,
+    },
+    /// A source length is zero, negative, or no number.
+    #[error(
+        "edge {edge} between vertices {} and {} has length {length:e}; weld or remove the degenerate faces at it", vertices[0], vertices[1]
+    )]
+    BadLength {
+        /// Edge.
+        edge: EdgeId,
+        /// Its ends.
+        vertices: [VertexId; 2],
+        /// Its length, source units.
+        length: f64,
+    },
+    /// A prescribed curvature leaves no positive cone angle, or is no number.
+    #[error(
+        "vertex {vertex} has a target curvature of {curvature}, which must be a number below {bound} so that its cone angle is positive"
+    )]
+    BadTarget {
+        /// Vertex.
+        vertex: VertexId,
+        /// Its K̄, radians.
+        curvature: f64,
+        /// 2π, or π on the boundary.
+        bound: f64,
+    },
+    /// The prescription misses Gauss–Bonnet (5).
+    #[error(
+        "the prescribed curvatures sum to {prescribed}, but the surface needs {required} (2π times its Euler characteristic)"
+    )]
+    GaussBonnet {
+        /// Σ K̄, radians.
+        prescribed: f64,
+        /// 2πχ, radians.
+        required: f64,
+    },
+    /// A circle packing cannot exist (6).
+    #[error(transparent)]
+    Infeasible(#[from] Violation),
+    /// No packing close to the mesh was found.
+    #[error(transparent)]
+    Packing(#[from] PackingError),
+    /// A linear system could not be solved.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// The minimum was not reached, or it has broken faces.
+    #[error("{}", not_converged_message(*.scheme, *.iterations, *.max_error, *.tolerance, *.broken, .faces))]
+    NotConverged {
+        /// Which conformal structure.
+        scheme: Scheme,
+        /// Steps taken.
+        iterations: usize,
+        /// max |K − K̄| where it ended, radians.
+        max_error: f64,
+        /// What was asked for, radians.
+        tolerance: f64,
+        /// Number of faces that break the triangle inequality there.
+        broken: usize,
+        /// The first of them.
+        faces: Vec<FaceId>,
+    },
+    /// The curvatures are met, but `u` runs away: a packing that (6) rules out by equality has curvatures that reach the target
+    /// only in the limit.
+    #[error("{}", runaway_message(*.scheme, *.iterations, *.range, *.change))]
+    Runaway {
+        /// Which conformal structure.
+        scheme: Scheme,
+        /// Steps taken.
+        iterations: usize,
+        /// Largest minus smallest `u` where it ended.
+        range: f64,
+        /// By how much a further step would still change the difference of two `u`; infinite where no step exists.
+        change: f64,
+    },
+    /// The observer asked to stop.
+    #[error("the flow was cancelled")]
+    Cancelled,
+}
+
+fn not_converged_message(
+    scheme: Scheme,
+    iterations: usize,
+    max_error: f64,
+    tolerance: f64,
+    broken: usize,
+    faces: &[FaceId],
+) -> String {
+    let met = max_error <= tolerance;
+    let mut message = match met {
+        // Then it is the broken faces.
+        true => format!(
+            "the flow has no solution on this connectivity: after {iterations} steps the curvatures are met"
+        ),
+        false => format!(
+            "the flow did not converge: after {iterations} steps the largest curvature error is {max_error:.3e} (bound {tolerance:.1e})"
+        ),
+    };
+    if broken > 0 {
+        let listed: Vec<String> = faces.iter().map(FaceId::to_string).collect();
+        let more = if broken > faces.len() { ", …" } else { "" };
+        message += &format!(
+            "{} {broken} faces break the triangle inequality (faces {}{more})",
+            if met { ", but" } else { " and" },
+            listed.join(", ")
+        );
+    }
+    message + remedy(scheme)
+}
+
+fn runaway_message(scheme: Scheme, iterations: usize, range: f64, change: f64) -> String {
+    let what = match scheme {
+        Scheme::Tangential | Scheme::Thurston => {
+            "circles drift apart in size without end: some region meets (6) with equality only"
+        }
+        Scheme::VertexScaling | Scheme::InversiveDistance => {
+            "scales drift apart without end: the minimum lies at infinity"
+        }
+    };
+    let still = match change.is_finite() {
+        true => format!("a further step would change that by {change:.1e}"),
+        false => "the system has become singular".to_string(),
+    };
+    format!(
+        "the flow has no solution on this connectivity: the curvatures are met after {iterations} steps, but the {what} (log scales differ by {range:.1}, and {still}){}",
+        remedy(scheme)
+    )
+}
+
+fn remedy(scheme: Scheme) -> &'static str {
+    match scheme {
+        Scheme::VertexScaling | Scheme::InversiveDistance => {
+            "; use the scheme `tangential`, which breaks no triangle, or remesh the needle faces there"
+        }
+        Scheme::Tangential | Scheme::Thurston => {
+            "; raise the valence around the cones by connectivity repair, or spread the curvature over more cones"
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_message_gives_an_error_below_its_bound_as_the_reason() {
+        let broken = [FaceId::new(4)];
+        let met = not_converged_message(Scheme::VertexScaling, 9, 1e-12, 1e-10, 1, &broken);
+        assert!(met.contains("the curvatures are met, but 1 faces break"));
+        assert!(!met.contains("error"));
+        let missed = not_converged_message(Scheme::VertexScaling, 9, 1.5, 1e-10, 1, &broken);
+        assert!(missed.contains("error is 1.500e0 (bound 1.0e-10) and 1 faces break"));
+        let away = runaway_message(Scheme::Thurston, 44, 52.0, 1.0);
+        assert!(away.contains("(6) with equality only") && !away.contains("bound"));
+    }
+}
