@@ -1,0 +1,7 @@
+//! From a flat metric to charts, patches and geometry images: sections 5.4 and 5.5 of the tutorial.
+pub mod charts;
+pub mod cut;
+pub mod develop;
+pub mod geometry_image;
+pub mod patches;
+pub mod plane;

@@ -1,0 +1,334 @@
+//! What is left of small patches after merging, where no neighbour can take one as a whole.
+//!
+//! 1. [`dissolve`] divides a patch among several neighbours, face by face, or leaves it as it was.
+//! 2. [`widen`] lets a crumb that cannot be divided grow at its neighbours' cost, so that its image is worth
+//!    having.
+//!
+//! Every single step keeps all patches disks, injective and inside the range of log scale.
+
+use super::merge::around;
+use super::overlap::overlap;
+use super::segment::{Placement, TOUCHING, borders, centroid, place};
+use super::slit::Slit;
+use crate::atlas::plane;
+use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId};
+use std::collections::{BTreeSet, HashSet};
+
+/// Patches of more faces are not divided: their neighbours would become ragged.
+const DIVIDED: usize = 600;
+/// Patches of fewer faces are crumbs …
+const CRUMB: usize = 16;
+/// … and grow up to this many.
+const GROWN: usize = 48;
+
+/// Disjoint sets of faces that cover the slit disk.
+struct Parts<'a> {
+    slit: &'a Slit<'a>,
+    label: FaceVec<u32>,
+    faces: Vec<Vec<FaceId>>,
+    log_scale: Vec<[f64; 2]>,
+    range: f64,
+}
+
+impl<'a> Parts<'a> {
+    fn new(slit: &'a Slit, patches: Vec<Vec<FaceId>>, range: f64) -> Parts<'a> {
+        let mut label = FaceVec::filled(0u32, slit.connectivity.face_count());
+        let mut log_scale = Vec::with_capacity(patches.len());
+        for (i, faces) in (0u32..).zip(&patches) {
+            let mut scale = [f64::INFINITY, f64::NEG_INFINITY];
+            for &f in faces {
+                label[f] = i;
+                scale = joined(scale, slit.log_scale[f]);
+            }
+            log_scale.push(scale);
+        }
+        Parts {
+            slit,
+            label,
+            faces: patches,
+            log_scale,
+            range,
+        }
+    }
+
+    fn neighbours(&self, part: u32) -> Vec<u32> {
+        let faces = &self.faces[part as usize];
+        borders(self.slit, faces, &self.label, part)
+            .into_keys()
+            .collect()
+    }
+
+    /// Parts in the order of their size, the smallest first.
+    fn by_size(&self) -> Vec<u32> {
+        let mut order: Vec<u32> = (0..self.faces.len() as u32).collect();
+        order.sort_by_key(|&i| (self.faces[i as usize].len(), i));
+        order
+    }
+
+    fn fits(&self, f: FaceId, part: u32) -> bool {
+        let [low, high] = joined(self.log_scale[part as usize], self.slit.log_scale[f]);
+        high - low <= self.range
+    }
+
+    /// Sides that a face has in common with a part, and corners.
+    fn shared(&self, f: FaceId, part: u32) -> (usize, usize) {
+        let corners = self.slit.connectivity.face_halfedges(f);
+        let beside = self.slit.neighbours(f);
+        let sides = beside.filter(|&n| self.label[n] == part).count();
+        let touches =
+            |h: &HalfedgeId| around(self.slit, *h).any(|g| g != f && self.label[g] == part);
+        (sides, corners.iter().filter(|h| touches(h)).count())
+    }
+
+    /// True where a part stays a disk when it takes a face: what they share is one path.
+    fn can_take(&self, f: FaceId, part: u32) -> bool {
+        let (sides, corners) = self.shared(f, part);
+        sides > 0 && corners == sides + 1
+    }
+
+    /// True where the face's own part stays a disk without it: the face is an ear, or has one side on the
+    /// border and the corner opposite to it inside.
+    fn can_give(&self, f: FaceId) -> bool {
+        let part = self.label[f];
+        let (sides, corners) = self.shared(f, part);
+        let c = self.slit.connectivity;
+        let is_inside = |h: &HalfedgeId| {
+            let other = |h: HalfedgeId| self.slit.across(h).map(|t| c.face(t));
+            other(*h).is_some_and(|n| self.label[n] == part)
+        };
+        match (sides, corners) {
+            (1, 2) => true,
+            (2, 3) => {
+                let border = c.face_halfedges(f).into_iter().find(|h| !is_inside(h));
+                border.is_some_and(|h| self.is_interior(c.prev(h), part))
+            }
+            _ => false,
+        }
+    }
+
+    /// True where all faces around the tail of a halfedge are the part's and the slit disk is whole there.
+    fn is_interior(&self, start: HalfedgeId, part: u32) -> bool {
+        let c = self.slit.connectivity;
+        let mut h = start;
+        loop {
+            if self.label[c.face(h)] != part {
+                return false;
+            }
+            let Some(next) = self.slit.across(c.prev(h)) else {
+                return false;
+            };
+            if next == start {
+                return true;
+            }
+            h = next;
+        }
+    }
+}
+
+fn joined([low, high]: [f64; 2], x: f64) -> [f64; 2] {
+    [low.min(x), high.max(x)]
+}
+
+/// Divides small patches among their neighbours where that is possible; `own` is scratch space, a place a copy.
+pub(super) fn dissolve(
+    slit: &Slit,
+    patches: Vec<Vec<FaceId>>,
+    range: f64,
+    own: &mut [[f64; 2]],
+) -> Vec<Vec<FaceId>> {
+    let mut parts = Parts::new(slit, patches, range);
+    for small in parts.by_size() {
+        let count = parts.faces[small as usize].len();
+        if count <= DIVIDED {
+            divide(&mut parts, small, own);
+        }
+    }
+    parts.faces.retain(|faces| !faces.is_empty());
+    parts.faces
+}
+
+/// Gives every face of a part to a neighbour, or changes nothing.
+fn divide(parts: &mut Parts, small: u32, own: &mut [[f64; 2]]) {
+    let mut faces = parts.faces[small as usize].clone();
+    faces.sort();
+    // Faces that each neighbour has room for in the plane.
+    let free: Vec<(u32, HashSet<FaceId>)> = parts
+        .neighbours(small)
+        .into_iter()
+        .map(|other| (other, room(parts, &faces, small, other, own)))
+        .collect();
+    if faces
+        .iter()
+        .any(|f| free.iter().all(|(_, free)| !free.contains(f)))
+    {
+        return;
+    }
+    let before = parts.log_scale.clone();
+    let mut left = faces.clone();
+    loop {
+        let count = left.len();
+        left.retain(|&f| {
+            let sides = |other: u32| parts.shared(f, other).0;
+            let taker = free
+                .iter()
+                .filter(|(other, free)| {
+                    free.contains(&f) && parts.fits(f, *other) && parts.can_take(f, *other)
+                })
+                .map(|(other, _)| *other)
+                .min_by_key(|&other| (std::cmp::Reverse(sides(other)), other));
+            if let Some(other) = taker {
+                parts.label[f] = other;
+                let scale = &mut parts.log_scale[other as usize];
+                *scale = joined(*scale, parts.slit.log_scale[f]);
+            }
+            taker.is_none()
+        });
+        if left.is_empty() || left.len() == count {
+            break;
+        }
+    }
+    if left.is_empty() {
+        for f in faces {
+            let taker = parts.label[f];
+            parts.faces[taker as usize].push(f);
+        }
+        parts.faces[small as usize].clear();
+    } else {
+        for f in faces {
+            parts.label[f] = small;
+        }
+        parts.log_scale = before;
+    }
+}
+
+/// The faces of a part that overlap none of its neighbour's.
+fn room(
+    parts: &Parts,
+    faces: &[FaceId],
+    small: u32,
+    other: u32,
+    own: &mut [[f64; 2]],
+) -> HashSet<FaceId> {
+    let slit = parts.slit;
+    let theirs = &parts.faces[other as usize];
+    let Some(&root) = theirs.first() else {
+        return HashSet::new();
+    };
+    let highest = parts.log_scale[other as usize][1].max(parts.log_scale[small as usize][1]);
+    let member = |f| [small, other].contains(&parts.label[f]);
+    let placement = place(slit, theirs.iter().copied(), root, highest, member, own);
+    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for p in faces.iter().flat_map(|&f| placement.triangle(slit, f)) {
+        for i in 0..2 {
+            low[i] = low[i].min(p[i]);
+            high[i] = high[i].max(p[i]);
+        }
+    }
+    let near: Vec<FaceId> = theirs
+        .iter()
+        .copied()
+        .filter(|&f| {
+            let t = placement.triangle(slit, f);
+            (0..2).all(|i| t.iter().any(|p| p[i] > low[i]) && t.iter().any(|p| p[i] < high[i]))
+        })
+        .collect();
+    if near.is_empty() {
+        return faces.iter().copied().collect();
+    }
+    // For triangles of both parts: a grid made for much smaller ones would have endless cells.
+    let both: Vec<FaceId> = near.iter().chain(faces).copied().collect();
+    let mut index = placement.index(slit, &both);
+    for &f in &near {
+        index.insert(placement.triangle(slit, f));
+    }
+    let free = |f: &FaceId| !index.overlaps(&placement.triangle(slit, *f));
+    faces.iter().copied().filter(free).collect()
+}
+
+/// Lets crumbs grow at the cost of neighbours that have plenty; `own` is scratch space, a place a copy.
+pub(super) fn widen(
+    slit: &Slit,
+    patches: Vec<Vec<FaceId>>,
+    range: f64,
+    own: &mut [[f64; 2]],
+) -> Vec<Vec<FaceId>> {
+    let mut parts = Parts::new(slit, patches, range);
+    let mut sizes: Vec<usize> = parts.faces.iter().map(Vec::len).collect();
+    for crumb in parts.by_size() {
+        if sizes[crumb as usize] >= CRUMB {
+            break;
+        }
+        grow_crumb(&mut parts, &mut sizes, crumb, own);
+    }
+    for faces in &mut parts.faces {
+        faces.clear();
+    }
+    for f in slit.connectivity.faces() {
+        parts.faces[parts.label[f] as usize].push(f);
+    }
+    parts.faces
+}
+
+fn grow_crumb(parts: &mut Parts, sizes: &mut [usize], crumb: u32, own: &mut [[f64; 2]]) {
+    let slit = parts.slit;
+    let mut faces: Vec<FaceId> = slit
+        .connectivity
+        .faces()
+        .filter(|&f| parts.label[f] == crumb)
+        .collect();
+    let Some(&root) = faces.first() else { return };
+    // All that it may come to, which is all that needs a place.
+    let mut ball: BTreeSet<FaceId> = faces.iter().copied().collect();
+    let mut ring = faces.clone();
+    for _ in 0..GROWN / 4 {
+        let next = ring.iter().flat_map(|&f| slit.neighbours(f));
+        ring = next
+            .collect::<BTreeSet<_>>()
+            .difference(&ball)
+            .copied()
+            .collect();
+        ball.extend(&ring);
+    }
+    let highest = parts.log_scale[crumb as usize][1];
+    let member = |f| ball.contains(&f);
+    let placement = place(slit, ball.iter().copied(), root, highest, member, own);
+    let middles: Vec<[f64; 2]> = faces
+        .iter()
+        .map(|&f| centroid(&placement.triangle(slit, f)))
+        .collect();
+    let n = middles.len() as f64;
+    let middle = std::array::from_fn(|i| middles.iter().map(|p| p[i] / n).sum::<f64>());
+    let key = |f: FaceId| {
+        let d = plane::distance(centroid(&placement.triangle(slit, f)), middle);
+        ((d / placement.extent * 1e7).round() as u64, f)
+    };
+    while faces.len() < GROWN {
+        let extent = Placement::new(slit, placement.positions, faces.iter().copied()).extent;
+        let is_free = |f: FaceId| {
+            let t = placement.triangle(slit, f);
+            let meets = |&g: &FaceId| overlap(&t, &placement.triangle(slit, g), TOUCHING * extent);
+            !faces.iter().any(meets)
+        };
+        let beside: BTreeSet<(u64, FaceId)> = faces
+            .iter()
+            .flat_map(|&f| slit.neighbours(f))
+            .filter(|f| parts.label[*f] != crumb && ball.contains(f))
+            .map(key)
+            .collect();
+        let taken = beside.into_iter().map(|(_, f)| f).find(|&f| {
+            // The donor stays the larger one, and no crumb itself.
+            sizes[parts.label[f] as usize] > 2 * faces.len().max(CRUMB)
+                && parts.fits(f, crumb)
+                && parts.can_take(f, crumb)
+                && parts.can_give(f)
+                && is_free(f)
+        });
+        let Some(f) = taken else { break };
+        sizes[parts.label[f] as usize] -= 1;
+        sizes[crumb as usize] += 1;
+        parts.label[f] = crumb;
+        let scale = &mut parts.log_scale[crumb as usize];
+        *scale = joined(*scale, slit.log_scale[f]);
+        faces.push(f);
+    }
+}

@@ -1,0 +1,250 @@
+//! Patches: injective, scale-bounded parts of the central chart, their seams, and their packing.
+//!
+//! *Enters:* a surface, its flat lengths, the cut and the central chart, an immersion that may overlap
+//! itself and span any range of scale. *Leaves:* a [`PatchLayout`].
+//!
+//! *Guaranteed:* every face is in one patch; a patch is connected across edges that are not cut,
+//! a topological disk, and injective in the plane (up to 1e-10 of its extent); its regional log scale
+//! (½ ln(flat area / source area), averaged over the stars of a face's corners) stays within
+//! [`PatchParams::log_scale_range`]; its image holds it with a margin and covers at least a few texel
+//! centres; patch → chart is a similarity without reflection. The same for any number of threads, and the
+//! same patches under changes of the input's last digits.
+//! *Not guaranteed:* the least number of patches, and the range for the log scale of single faces: a
+//! sliver differs from its surroundings by any amount.
+//!
+//! The tutorial has no patches: it shows one chart that overlaps itself (Fig. 19d). A geometry image needs
+//! a domain that does not.
+
+mod dissolve;
+mod merge;
+mod overlap;
+mod packing;
+pub(crate) mod raster;
+mod rectangle;
+mod resolution;
+mod seams;
+mod segment;
+mod slit;
+
+#[cfg(test)]
+pub(crate) mod samples;
+#[cfg(test)]
+mod tests;
+
+use crate::atlas::cut::CutGraph;
+use crate::atlas::develop::Development;
+use crate::atlas::plane::Similarity;
+use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, PatchId};
+use crate::geometry::mesh::Mesh;
+use slit::Slit;
+
+/// Most texels on a side of an image.
+pub const MAX_SIDE: usize = 8192;
+
+/// The domain of one geometry image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Patch {
+    /// Patch coordinates to central-chart coordinates.
+    pub to_chart: Similarity,
+    /// Columns of the image.
+    pub width: usize,
+    /// Rows of the image.
+    pub height: usize,
+    /// (column, row, 1) of a texel's centre, row 0 at the top and the centre of texel (0, 0) at (0.5, 0.5),
+    /// to patch coordinates.
+    pub texel_to_patch: [[f64; 3]; 2],
+    /// Where the patch lies in the packed unit square: `packed = uv * scale + offset`, v up.
+    pub packed_scale: f64,
+    /// See `packed_scale`.
+    pub packed_offset: [f64; 2],
+}
+
+/// A maximal chain along which two patches meet, or a patch meets itself or the surface's boundary.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Seam {
+    /// Patch on the left of the chain.
+    pub left: PatchId,
+    /// Patch on the right; none at a surface boundary.
+    pub right: Option<PatchId>,
+    /// Samples in order; the first again at the end of a closed seam.
+    pub samples: Vec<SeamSample>,
+}
+
+/// A point of a seam, the same for both sides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeamSample {
+    /// In space.
+    pub position: [f64; 3],
+    /// In the left patch.
+    pub left: [f64; 2],
+    /// In the right patch; NaN at a surface boundary.
+    pub right: [f64; 2],
+}
+
+/// All patches of one component.
+#[derive(Clone, Debug)]
+pub struct PatchLayout {
+    /// Patch of every face.
+    pub face_patch: FaceVec<PatchId>,
+    /// Patch coordinates of the corners of every face.
+    pub uv: FaceVec<[[f64; 2]; 3]>,
+    /// The patches.
+    pub patches: Vec<Patch>,
+    /// Their common borders.
+    pub seams: Vec<Seam>,
+}
+
+/// Parameters of patches and packing.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PatchParams {
+    /// Largest log-scale range inside a patch (natural logarithm of the length scale).
+    pub log_scale_range: f64,
+    /// Texels of all images of a component together (about).
+    pub texel_budget: usize,
+    /// Least texels on the longer side of an image.
+    pub min_side: usize,
+    /// Texels between patches in the packed square, and around each image.
+    pub padding: usize,
+}
+
+impl Default for PatchParams {
+    fn default() -> Self {
+        Self {
+            log_scale_range: 2.0,
+            texel_budget: 512 * 512,
+            min_side: 64,
+            padding: 2,
+        }
+    }
+}
+
+/// Why there are no patches.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PatchError {
+    /// A parameter is out of its range.
+    #[error("patches.{name} is {value}; set it to a number from {least} to {most}")]
+    Parameter {
+        /// Name of the parameter.
+        name: &'static str,
+        /// What was given.
+        value: f64,
+        /// Least allowed.
+        least: f64,
+        /// Most allowed.
+        most: f64,
+    },
+    /// The central chart or the metric has no numbers for a face.
+    #[error(
+        "face {face} has no finite place in the plane (coordinate or flat length {value}); its scale is beyond what can be computed, use more cones or smaller ones"
+    )]
+    NotFinite {
+        /// The face.
+        face: u32,
+        /// The number.
+        value: f64,
+    },
+}
+
+impl PatchParams {
+    /// Refuses values that no layout can have.
+    pub fn validate(&self) -> Result<(), PatchError> {
+        let bounds = [
+            ("log_scale_range", self.log_scale_range, 1e-3, 1e3),
+            ("texel_budget", self.texel_budget as f64, 1.0, 1e9),
+            ("min_side", self.min_side as f64, 1.0, 4096.0),
+            ("padding", self.padding as f64, 0.0, 64.0),
+        ];
+        for (name, value, least, most) in bounds {
+            if !(least..=most).contains(&value) {
+                return Err(PatchError::Parameter {
+                    name,
+                    value,
+                    least,
+                    most,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Divides the central chart into patches, gives each an image size and a place in the packed square, and
+/// finds the seams.
+///
+/// `length` holds the flat length of every edge, `development` the central chart of the disk that `cut` makes.
+///
+/// # Errors
+/// A parameter out of range, or coordinates and lengths that are not finite.
+pub fn layout(
+    mesh: &Mesh,
+    length: &EdgeVec<f64>,
+    cut: &CutGraph,
+    development: &Development,
+    params: &PatchParams,
+) -> Result<PatchLayout, PatchError> {
+    params.validate()?;
+    let c = &mesh.connectivity;
+    for f in c.faces() {
+        let lengths = c.face_edges(f).map(|e| length[e]);
+        let mut numbers = development.uv[f].iter().flatten().chain(&lengths);
+        if let Some(&value) = numbers.find(|x| !x.is_finite()) {
+            return Err(PatchError::NotFinite {
+                face: f.raw(),
+                value,
+            });
+        }
+    }
+    let slit = Slit::new(mesh, length, cut, development);
+    let sets = segment::segment(&slit, params.log_scale_range);
+    let mut face_patch = FaceVec::filled(PatchId::new(0), c.face_count());
+    let mut uv = FaceVec::filled([[0.0; 2]; 3], c.face_count());
+    let mut own = vec![[0.0; 2]; development.copies];
+    let mut oriented = Vec::with_capacity(sets.len());
+    for (i, faces) in sets.iter().enumerate() {
+        let patch = rectangle::orient(&slit, faces, &mut own);
+        for (&f, &corners) in faces.iter().zip(&patch.uv) {
+            face_patch[f] = PatchId::new(i);
+            uv[f] = corners;
+        }
+        oriented.push(patch);
+    }
+    let area = |faces: &Vec<FaceId>| faces.iter().map(|&f| slit.source_area[f]).sum();
+    let source_area: Vec<f64> = sets.iter().map(area).collect();
+    let rasters = resolution::rasters(&oriented, &source_area, params);
+    // In the packed square every patch has its image's density, on square texels.
+    let sizes: Vec<[usize; 2]> = oriented
+        .iter()
+        .zip(&rasters)
+        .map(|(patch, raster)| {
+            let rows = (raster.density * patch.height - 1e-6).ceil().max(1.0);
+            [raster.width, (rows + 2.0 * raster.margin).round() as usize]
+        })
+        .collect();
+    let (corners, side) = packing::pack(&sizes);
+    let side = side as f64;
+    let patches = oriented
+        .iter()
+        .zip(&rasters)
+        .zip(sizes.iter().zip(&corners))
+        .map(|((patch, raster), (size, corner))| {
+            let content = [raster.density, raster.density * patch.height];
+            let place = |i: usize| corner[i] as f64 + 0.5 * (size[i] as f64 - content[i]);
+            Patch {
+                to_chart: patch.to_chart,
+                width: raster.width,
+                height: raster.height,
+                texel_to_patch: raster.texel_to_patch,
+                packed_scale: raster.density / side,
+                packed_offset: [place(0) / side, place(1) / side],
+            }
+        })
+        .collect();
+    let seams = seams::seams(&slit, &face_patch, &uv);
+    Ok(PatchLayout {
+        face_patch,
+        uv,
+        patches,
+        seams,
+    })
+}

@@ -1,0 +1,195 @@
+//! Which triangles of the plane overlap: a grid of several cell sizes, and the separating-axis test.
+//!
+//! Triangles that only touch do not overlap. "Only" has a tolerance, since coordinates that come
+//! out of a flow differ in their last digits from one machine to the next, and two sheets that meet
+//! exactly along a cut must be judged the same way every time. It is far above rounding and far
+//! below a texel, so an exact predicate would decide nothing better here.
+
+use std::collections::HashMap;
+
+/// A triangle of the plane.
+pub(super) type Triangle = [[f64; 2]; 3];
+
+const END: u32 = u32::MAX;
+
+/// The triangles of a patch so far, found by place.
+pub(super) struct TriangleIndex {
+    triangles: Vec<(Triangle, i32)>,
+    /// Triangles of the cell's own size.
+    own: HashMap<(i32, i64, i64), u32>,
+    /// Triangles of the cell's own size or smaller.
+    all: HashMap<(i32, i64, i64), u32>,
+    /// Linked lists: triangle and next node.
+    nodes: Vec<(u32, u32)>,
+    /// Least and greatest level of any triangle that will come; a cell of level k measures 2^k.
+    levels: [i32; 2],
+    /// Deepest overlap that still counts as touching.
+    tolerance: f64,
+}
+
+impl TriangleIndex {
+    /// For triangles whose bounding boxes measure `sizes[0]` to `sizes[1]`. Others are found as well,
+    /// only more slowly.
+    pub fn new(sizes: [f64; 2], tolerance: f64) -> TriangleIndex {
+        let largest = level(sizes[1]);
+        TriangleIndex {
+            triangles: Vec::new(),
+            own: HashMap::new(),
+            all: HashMap::new(),
+            nodes: Vec::new(),
+            // Finer than a thousandth of the largest pays no more.
+            levels: [level(sizes[0]).clamp(largest - 10, largest), largest],
+            tolerance,
+        }
+    }
+
+    fn level_of(&self, t: &Triangle) -> i32 {
+        level(size(t)).clamp(self.levels[0], self.levels[1])
+    }
+
+    /// Adds a triangle.
+    pub fn insert(&mut self, t: Triangle) {
+        let id = self.triangles.len() as u32;
+        let own = self.level_of(&t);
+        self.triangles.push((t, own));
+        let nodes = &mut self.nodes;
+        let mut push = |map: &mut HashMap<_, u32>, key| {
+            let head = map.entry(key).or_insert(END);
+            nodes.push((id, *head));
+            *head = (nodes.len() - 1) as u32;
+        };
+        for (x, y) in cells(&t, own) {
+            push(&mut self.own, (own, x, y));
+        }
+        for k in own..=self.levels[1] {
+            for (x, y) in cells(&t, k) {
+                push(&mut self.all, (k, x, y));
+            }
+        }
+    }
+
+    /// True where the triangle overlaps one that was added.
+    pub fn overlaps(&self, t: &Triangle) -> bool {
+        let own = self.level_of(t);
+        (own..=self.levels[1]).any(|k| {
+            let map = if k == own { &self.all } else { &self.own };
+            cells(t, k).any(|(x, y)| {
+                let mut node = map.get(&(k, x, y)).copied().unwrap_or(END);
+                while node != END {
+                    let (id, next) = self.nodes[node as usize];
+                    if overlap(t, &self.triangles[id as usize].0, self.tolerance) {
+                        return true;
+                    }
+                    node = next;
+                }
+                false
+            })
+        })
+    }
+}
+
+/// The longer side of the bounding box.
+pub(super) fn size(t: &Triangle) -> f64 {
+    let (low, high) = bounds(t);
+    (high[0] - low[0]).max(high[1] - low[1])
+}
+
+fn bounds(t: &Triangle) -> ([f64; 2], [f64; 2]) {
+    let of = |i: usize, f: fn(f64, f64) -> f64| f(f(t[0][i], t[1][i]), t[2][i]);
+    (
+        [of(0, f64::min), of(1, f64::min)],
+        [of(0, f64::max), of(1, f64::max)],
+    )
+}
+
+fn level(size: f64) -> i32 {
+    // Zero has no logarithm; nothing is smaller than the least normal number.
+    size.max(f64::MIN_POSITIVE).log2().ceil() as i32
+}
+
+fn cells(t: &Triangle, level: i32) -> impl Iterator<Item = (i64, i64)> + use<> {
+    let cell = f64::from(level).exp2();
+    let (low, high) = bounds(t);
+    let at = |x: f64| (x / cell).floor() as i64;
+    let (xs, ys) = (at(low[0])..=at(high[0]), at(low[1])..=at(high[1]));
+    xs.flat_map(move |x| ys.clone().map(move |y| (x, y)))
+}
+
+/// True where two counterclockwise triangles overlap by more than `tolerance`, that is, where no side
+/// of either has the other one wholly on its outer side. The tolerance is taken no larger than a
+/// hundredth of the smaller triangle, so that small triangles do not hide in it.
+pub(super) fn overlap(a: &Triangle, b: &Triangle, tolerance: f64) -> bool {
+    let (low_a, high_a) = bounds(a);
+    let (low_b, high_b) = bounds(b);
+    if (0..2).any(|i| low_a[i] >= high_b[i] || low_b[i] >= high_a[i]) {
+        return false;
+    }
+    let tolerance = tolerance.min(0.01 * size(a).min(size(b)));
+    !(separates(a, b, tolerance) || separates(b, a, tolerance))
+}
+
+fn separates(a: &Triangle, b: &Triangle, tolerance: f64) -> bool {
+    (0..3).any(|k| {
+        let (p, q) = (a[k], a[(k + 1) % 3]);
+        let d = [q[0] - p[0], q[1] - p[1]];
+        let limit = tolerance * d[0].hypot(d[1]);
+        b.iter()
+            .all(|r| d[0] * (r[1] - p[1]) - d[1] * (r[0] - p[0]) <= limit)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const T: Triangle = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+
+    fn moved(t: Triangle, scale: f64, by: [f64; 2]) -> Triangle {
+        t.map(|p| [scale * p[0] + by[0], scale * p[1] + by[1]])
+    }
+
+    #[test]
+    fn touching_is_no_overlap_and_crossing_is() {
+        let across = [[1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        assert!(!overlap(&T, &across, 1e-12));
+        assert!(!overlap(&T, &moved(T, 1.0, [1.0, 0.0]), 1e-12));
+        assert!(overlap(&T, &moved(T, 1.0, [0.4, 0.4]), 1e-12));
+        assert!(overlap(&T, &moved(T, 0.1, [0.2, 0.2]), 1e-12), "inside");
+        assert!(overlap(&T, &T, 1e-12), "itself");
+        // A star of David: no corner of one in the other.
+        let up = [[-1.0, -0.5], [1.0, -0.5], [0.0, 1.2]];
+        let down = [[0.0, -1.2], [1.0, 0.5], [-1.0, 0.5]];
+        assert!(overlap(&up, &down, 1e-12));
+        // The tolerance.
+        assert!(!overlap(&T, &moved(across, 1.0, [-1e-9, 0.0]), 1e-8));
+        assert!(overlap(&T, &moved(across, 1.0, [-1e-7, 0.0]), 1e-8));
+    }
+
+    #[test]
+    fn the_index_agrees_with_brute_force() {
+        // A fixed sequence of pseudo-random triangles of sizes from 1 to 1/4000.
+        let mut state = 12345u64;
+        let mut random = || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 33) as f64 / (1u64 << 31) as f64
+        };
+        let mut index = TriangleIndex::new([1.0 / 4000.0, 1.0], 1e-12);
+        let mut kept: Vec<Triangle> = Vec::new();
+        let mut refused = 0;
+        for _ in 0..3000 {
+            let scale = (12.0 * random()).exp2() / 4096.0;
+            let t = moved(T, scale, [8.0 * random() - 4.0, 8.0 * random() - 4.0]);
+            let brute = kept.iter().any(|k| overlap(&t, k, 1e-12));
+            assert_eq!(index.overlaps(&t), brute);
+            if brute {
+                refused += 1;
+            } else {
+                index.insert(t);
+                kept.push(t);
+            }
+        }
+        assert!(refused > 100 && kept.len() > 100);
+    }
+}

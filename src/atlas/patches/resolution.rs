@@ -1,0 +1,221 @@
+//! How many texels each patch gets: in proportion to its area in space, so that the surface is sampled
+//! evenly, with a floor so that no patch is too coarse to be of use.
+
+use super::raster::{cover, to_texel};
+use super::rectangle::Oriented;
+use super::{MAX_SIDE, PatchParams};
+
+/// Least texels on the shorter side, where that does not make the longer one absurd.
+const MIN_SHORT_SIDE: f64 = 8.0;
+/// The shorter side asks for no more than this on the longer one.
+const ENOUGH_LONG_SIDE: f64 = 1024.0;
+/// Least texel areas inside a patch.
+const MIN_AREA: f64 = 64.0;
+/// Least texel centres inside a patch.
+const MIN_COVERED: usize = 24;
+
+/// The raster of one patch.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Raster {
+    /// Columns of the image.
+    pub width: usize,
+    /// Rows of the image.
+    pub height: usize,
+    /// See [`super::Patch::texel_to_patch`].
+    pub texel_to_patch: [[f64; 3]; 2],
+    /// Texels a unit of u.
+    pub density: f64,
+    /// Columns and rows between the image's border and the patch's rectangle, at least.
+    pub margin: f64,
+}
+
+/// Rasters of all patches; `source_area` is theirs in space.
+pub(super) fn rasters(
+    patches: &[Oriented],
+    source_area: &[f64],
+    params: &PatchParams,
+) -> Vec<Raster> {
+    let margin = (params.padding as f64).max(0.5);
+    let most = (MAX_SIDE - 2 * params.padding.max(1)) as f64;
+    let floors: Vec<f64> = patches
+        .iter()
+        .map(|p| least_density(p, params, most))
+        .collect();
+    let densities = balance(patches, source_area, &floors, params.texel_budget as f64);
+    patches
+        .iter()
+        .zip(densities)
+        .map(|(patch, density)| {
+            // Whole texels on the longer side. Half a texel off a floor there is no tie.
+            let mut columns = (density.min(most) + 0.5).floor().max(1.0);
+            loop {
+                let raster = isotropic(patch.height, columns, margin);
+                if covered(patch, &raster) >= MIN_COVERED {
+                    return raster;
+                }
+                if columns >= most {
+                    return stretched(patch.height, columns, margin);
+                }
+                columns = (2.0 * columns).min(most);
+            }
+        })
+        .collect()
+}
+
+fn least_density(patch: &Oriented, params: &PatchParams, most: f64) -> f64 {
+    let short_side = MIN_SHORT_SIDE / patch.height.max(f64::MIN_POSITIVE);
+    let area = (MIN_AREA / patch.area.max(f64::MIN_POSITIVE)).sqrt();
+    (params.min_side as f64)
+        .max(short_side.min(ENOUGH_LONG_SIDE))
+        .max(area.min(ENOUGH_LONG_SIDE))
+        .min(most)
+}
+
+/// Texels a unit of u for each patch: one number of texels an area in space, so large that all images
+/// together hold the budget, where the floors leave any choice.
+fn balance(patches: &[Oriented], source_area: &[f64], floors: &[f64], budget: f64) -> Vec<f64> {
+    let total_area: f64 = source_area.iter().sum();
+    let densities = |texels: f64| -> Vec<f64> {
+        let rows = patches.iter().zip(source_area).zip(floors);
+        rows.map(|((patch, area), &floor)| {
+            let inside = texels * area / total_area.max(f64::MIN_POSITIVE);
+            floor.max((inside / patch.area.max(f64::MIN_POSITIVE)).sqrt())
+        })
+        .collect()
+    };
+    let total = |densities: &[f64]| -> f64 {
+        let rows = densities.iter().zip(patches);
+        rows.map(|(d, p)| d * d * p.height).sum()
+    };
+    // A patch never fills more than its rectangle, so the answer lies in [0, budget].
+    let (mut low, mut high) = (0.0, budget);
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        if total(&densities(middle)) > budget {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    densities(low)
+}
+
+/// Square texels, `columns` of them on the patch's width; its height in the middle of the rows.
+fn isotropic(height: f64, columns: f64, margin: f64) -> Raster {
+    // A height of a whole number of texels must not gain a row by its last digits.
+    let rows = (columns * height - 1e-6).ceil().max(1.0);
+    raster(height, columns, [columns, columns], rows, margin)
+}
+
+/// Last resort for patches thousands of times longer than wide: rows closer together than columns.
+fn stretched(height: f64, columns: f64, margin: f64) -> Raster {
+    let rows = 2.0 * MIN_SHORT_SIDE;
+    let density = rows / height.max(1e-12);
+    raster(height, columns, [columns, density], rows, margin)
+}
+
+fn raster(height: f64, columns: f64, density: [f64; 2], rows: f64, margin: f64) -> Raster {
+    let image = [columns, rows].map(|n| (n + 2.0 * margin).round());
+    let left = 0.5 * (image[0] - density[0]);
+    let bottom = 0.5 * (image[1] - density[1] * height);
+    Raster {
+        width: image[0] as usize,
+        height: image[1] as usize,
+        texel_to_patch: [
+            [1.0 / density[0], 0.0, -left / density[0]],
+            [0.0, -1.0 / density[1], (image[1] - bottom) / density[1]],
+        ],
+        density: density[0],
+        margin,
+    }
+}
+
+/// Number of texel centres inside the patch, up to a little more than what is asked for.
+fn covered(patch: &Oriented, raster: &Raster) -> usize {
+    let mut seen = std::collections::BTreeSet::new();
+    for t in &patch.uv {
+        let t = t.map(|p| to_texel(&raster.texel_to_patch, p));
+        cover(t, raster.width, raster.height, |x, y, _| {
+            if seen.len() < MIN_COVERED {
+                seen.insert((x, y));
+            }
+        });
+        if seen.len() >= MIN_COVERED {
+            break;
+        }
+    }
+    seen.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::atlas::plane::Similarity;
+
+    fn rectangle(height: f64) -> Oriented {
+        let (a, b, c, d) = ([0.0, 0.0], [1.0, 0.0], [1.0, height], [0.0, height]);
+        Oriented {
+            uv: vec![[a, b, c], [a, c, d]],
+            height,
+            area: height,
+            to_chart: Similarity {
+                scale: 1.0,
+                rotation: 0.0,
+                translation: [0.0; 2],
+            },
+        }
+    }
+
+    #[test]
+    fn one_square_patch_gets_the_budget() {
+        let params = PatchParams::default();
+        let r = rasters(&[rectangle(1.0)], &[1.0], &params);
+        assert_eq!((r[0].width, r[0].height), (516, 516));
+        // The same up to the last digits.
+        for height in [1.0 - 1e-11, 1.0 + 1e-11] {
+            let near = rasters(&[rectangle(height)], &[3.0], &params);
+            assert_eq!((near[0].width, near[0].height), (516, 516));
+        }
+    }
+
+    #[test]
+    fn texels_follow_source_area_down_to_the_floor() {
+        let params = PatchParams::default();
+        let patches = [
+            rectangle(1.0),
+            rectangle(0.5),
+            rectangle(0.25),
+            rectangle(1.0),
+        ];
+        let r = rasters(&patches, &[4.0, 1.0, 1.0, 1e-9], &params);
+        let inside = |i: usize| r[i].density * r[i].density * patches[i].height;
+        assert!((inside(0) / inside(1) / 4.0 - 1.0).abs() < 0.02);
+        assert!((inside(1) / inside(2) - 1.0).abs() < 0.02);
+        assert_eq!(r[3].density, 64.0);
+        let total: f64 = (0..4).map(inside).sum();
+        assert!((total / params.texel_budget as f64 - 1.0).abs() < 0.02);
+    }
+
+    #[test]
+    fn every_patch_lies_in_its_image_and_is_covered() {
+        for padding in [0, 1, 5] {
+            let params = PatchParams {
+                padding,
+                texel_budget: 1,
+                ..Default::default()
+            };
+            for height in [1.0, 0.3, 0.01, 1e-5, 1e-9, 0.0] {
+                let patch = rectangle(height);
+                let r = &rasters(&[rectangle(height)], &[1.0], &params)[0];
+                for p in patch.uv.iter().flatten() {
+                    let [x, y] = to_texel(&r.texel_to_patch, *p);
+                    let margin = (padding as f64).max(0.5) - 1e-5;
+                    assert!(x >= margin && x <= r.width as f64 - margin);
+                    assert!(y >= margin && y <= r.height as f64 - margin, "{y} {r:?}");
+                }
+                assert!(r.width.max(r.height) <= MAX_SIDE);
+                assert!(height == 0.0 || covered(&patch, r) >= MIN_COVERED);
+            }
+        }
+    }
+}

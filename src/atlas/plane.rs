@@ -1,0 +1,105 @@
+//! Rigid motions and similarities of the plane.
+
+/// p ↦ R(rotation) p + translation.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RigidMotion {
+    /// Angle in radians, in (−π, π].
+    pub rotation: f64,
+    /// Added after the rotation.
+    pub translation: [f64; 2],
+}
+
+impl RigidMotion {
+    /// The image of a point.
+    pub fn apply(&self, p: [f64; 2]) -> [f64; 2] {
+        let q = rotate(p, self.rotation);
+        [q[0] + self.translation[0], q[1] + self.translation[1]]
+    }
+
+    /// First `first`, then `self`.
+    pub fn after(&self, first: &RigidMotion) -> RigidMotion {
+        RigidMotion {
+            rotation: wrap_angle(self.rotation + first.rotation),
+            translation: self.apply(first.translation),
+        }
+    }
+
+    /// The motion that undoes this one.
+    pub fn inverse(&self) -> RigidMotion {
+        let t = rotate(self.translation, -self.rotation);
+        RigidMotion {
+            rotation: wrap_angle(-self.rotation),
+            translation: [-t[0], -t[1]],
+        }
+    }
+}
+
+/// p ↦ scale · R(rotation) p + translation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Similarity {
+    /// Positive factor.
+    pub scale: f64,
+    /// Angle in radians, in (−π, π].
+    pub rotation: f64,
+    /// Added last.
+    pub translation: [f64; 2],
+}
+
+impl Similarity {
+    /// The image of a point.
+    pub fn apply(&self, p: [f64; 2]) -> [f64; 2] {
+        let q = rotate(p, self.rotation);
+        std::array::from_fn(|i| self.scale * q[i] + self.translation[i])
+    }
+}
+
+/// Rotates about the origin, counterclockwise.
+pub fn rotate(p: [f64; 2], angle: f64) -> [f64; 2] {
+    let (s, c) = angle.sin_cos();
+    [c * p[0] - s * p[1], s * p[0] + c * p[1]]
+}
+
+/// The same angle in (−π, π].
+pub fn wrap_angle(angle: f64) -> f64 {
+    use std::f64::consts::{PI, TAU};
+    let r = angle - TAU * (angle / TAU).round();
+    if r <= -PI { r + TAU } else { r }
+}
+
+/// Twice the signed area of a triangle.
+pub fn doubled_area(t: [[f64; 2]; 3]) -> f64 {
+    (t[1][0] - t[0][0]) * (t[2][1] - t[0][1]) - (t[1][1] - t[0][1]) * (t[2][0] - t[0][0])
+}
+
+/// Euclidean distance.
+pub fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (b[0] - a[0]).hypot(b[1] - a[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn motions_compose_and_invert() {
+        let a = RigidMotion {
+            rotation: 2.5,
+            translation: [1.0, -3.0],
+        };
+        let b = RigidMotion {
+            rotation: 1.7,
+            translation: [0.5, 4.0],
+        };
+        let p = [0.3, -0.8];
+        assert!(distance(a.after(&b).apply(p), a.apply(b.apply(p))) < 1e-14);
+        assert!(distance(a.inverse().apply(a.apply(p)), p) < 1e-14);
+    }
+
+    #[test]
+    fn angles_wrap_into_the_half_open_interval() {
+        assert_eq!(wrap_angle(-PI), PI);
+        assert_eq!(wrap_angle(PI), PI);
+        assert!((wrap_angle(-8.0 * PI + 0.25) - 0.25).abs() < 1e-14);
+    }
+}
