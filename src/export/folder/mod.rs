@@ -1,0 +1,352 @@
+//! Folders that appear complete or not at all.
+//!
+//! Files are written into a hidden staging folder beside the target, synced to disk, and the two
+//! folders are exchanged in one step. Whatever goes wrong before leaves the older folder untouched.
+//!
+//! A staging folder's name carries the machine and the process that made it. It disappears when
+//! the value is dropped, when [`remove_all_staging`] is called on Ctrl-C, and, after a crash, when
+//! a later run on the same machine finds that its process is gone.
+//! *Not guaranteed:* that two runs which write the same asset at the same time see each other; the
+//! later one wins, whole.
+
+mod unfinished;
+
+use crate::export::{Action, ExportError};
+use std::collections::BTreeSet;
+use std::ffi::OsStr;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::{Component, Path, PathBuf};
+use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
+use unfinished::{process_is_gone, remove_folder, replace, staging_name, sweep};
+
+/// The folder of one component of an asset that has several.
+pub fn component_name(component: usize) -> String {
+    format!("component-{component:03}")
+}
+
+/// Removes the staging folders of this process and refuses every further write, for the handler of
+/// Ctrl-C. A folder that is just being put in place is waited for: it is finished and stays.
+pub fn remove_all_staging() {
+    REGISTRY.close();
+}
+
+/// Finishes what dead runs of this machine left in an output folder: their staging folders are removed, and a
+/// folder that was set aside and not replaced goes back in place. Done once for each folder by [`Staging::begin`].
+pub fn sweep_stale(output_root: &Path) -> Result<(), ExportError> {
+    sweep(output_root, &process_is_gone).map_err(ExportError::io(Action::Read, output_root))
+}
+
+/// All live staging folders of a process.
+struct Registry {
+    state: Mutex<RegistryState>,
+}
+
+#[derive(Default)]
+struct RegistryState {
+    live: BTreeSet<PathBuf>,
+    swept: BTreeSet<PathBuf>,
+    closed: bool,
+}
+
+static REGISTRY: LazyLock<Registry> = LazyLock::new(Registry::new);
+
+impl Registry {
+    fn new() -> Self {
+        Self {
+            state: Mutex::default(),
+        }
+    }
+
+    /// The state; a panic elsewhere leaves it valid, because every change is one call.
+    fn lock(&self) -> MutexGuard<'_, RegistryState> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn lock_open(&self) -> Result<MutexGuard<'_, RegistryState>, ExportError> {
+        let state = self.lock();
+        if state.closed {
+            return Err(ExportError::Interrupted);
+        }
+        Ok(state)
+    }
+
+    fn close(&self) {
+        let mut state = self.lock();
+        state.closed = true;
+        for path in std::mem::take(&mut state.live) {
+            remove_folder(&path);
+        }
+    }
+}
+
+/// A folder that is being written; see the module docs.
+pub struct Staging {
+    registry: &'static Registry,
+    output_root: PathBuf,
+    target: PathBuf,
+    path: PathBuf,
+}
+
+impl Staging {
+    /// Makes the staging folder of `output_root/asset`, and `output_root` where it is missing.
+    /// Refuses a name that is no folder name and a target that this program did not write.
+    pub fn begin(output_root: &Path, asset: &str) -> Result<Staging, ExportError> {
+        Self::begin_in(&REGISTRY, output_root, asset)
+    }
+
+    fn begin_in(
+        registry: &'static Registry,
+        output_root: &Path,
+        asset: &str,
+    ) -> Result<Staging, ExportError> {
+        let target = output_root.join(asset_name(asset)?);
+        fs::create_dir_all(output_root)
+            .map_err(ExportError::io(Action::CreateFolder, output_root))?;
+        let mut state = registry.lock_open()?;
+        if state.swept.insert(output_root.to_owned())
+            && let Err(error) = sweep_stale(output_root)
+        {
+            // What others left must not keep this run from writing.
+            tracing::warn!(%error, "could not clear up after earlier runs");
+        }
+        check_target(&target)?;
+        let path = output_root.join(staging_name());
+        fs::create_dir(&path).map_err(ExportError::io(Action::CreateFolder, &path))?;
+        state.live.insert(path.clone());
+        drop(state);
+        Ok(Staging {
+            registry,
+            output_root: output_root.to_owned(),
+            target,
+            path,
+        })
+    }
+
+    /// The staging folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Where it will be put.
+    pub fn target(&self) -> &Path {
+        &self.target
+    }
+
+    /// Opens a new file; folders on the way (`images/`) are made. `relative` uses forward slashes.
+    pub fn create(&self, relative: &str) -> Result<StagedFile, ExportError> {
+        let path = self.inside(relative)?;
+        // Under the lock, so that nothing is made again after Ctrl-C removed everything.
+        let _state = self.registry.lock_open()?;
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).map_err(ExportError::io(Action::CreateFolder, folder))?;
+        }
+        let file = File::create(&path).map_err(ExportError::io(Action::Write, &path))?;
+        Ok(StagedFile {
+            shown: self.target.join(relative),
+            file: BufWriter::new(file),
+        })
+    }
+
+    /// Writes a whole file.
+    pub fn write(&self, relative: &str, bytes: &[u8]) -> Result<(), ExportError> {
+        let mut file = self.create(relative)?;
+        file.write_all(bytes)
+            .map_err(ExportError::io(Action::Write, file.path()))?;
+        file.finish()
+    }
+
+    /// Keeps a subfolder of the older output, such as that of a component that failed this time. Gives
+    /// false where the older output has none that is complete (no `atlas.json` in it).
+    pub fn keep_previous(&self, subfolder: &str) -> Result<bool, ExportError> {
+        let to = self.inside(subfolder)?;
+        let from = self.target.join(subfolder);
+        if !from.join("atlas.json").is_file() {
+            return Ok(false);
+        }
+        for name in list_files(&from)? {
+            let source = from.join(&name);
+            let bytes = fs::read(&source).map_err(ExportError::io(Action::Read, &source))?;
+            self.write(&format!("{subfolder}/{name}"), &bytes)?;
+        }
+        debug_assert!(to.is_dir());
+        Ok(true)
+    }
+
+    /// Puts the folder in place. On an error the older folder is where it was.
+    pub fn publish(self) -> Result<(), ExportError> {
+        sync_folders(&self.path).map_err(ExportError::io(Action::Publish, &self.target))?;
+        {
+            let _state = self.registry.lock_open()?;
+            check_target(&self.target)?;
+            replace(&self.path, &self.target)
+                .map_err(ExportError::io(Action::Publish, &self.target))?;
+        }
+        // The exchange is done: a folder that cannot be synced is still complete.
+        if let Err(error) = sync_folder(&self.output_root) {
+            tracing::warn!(path = %self.output_root.display(), %error, "could not sync the output folder");
+        }
+        // Dropping removes what is now at the staging path: the older folder, or nothing.
+        Ok(())
+    }
+
+    fn inside(&self, relative: &str) -> Result<PathBuf, ExportError> {
+        let normal = |c| matches!(c, Component::Normal(_));
+        if relative.is_empty() || !Path::new(relative).components().all(normal) {
+            return Err(ExportError::Encode {
+                path: self.target.join(relative),
+                message: "the path leaves the asset's folder".into(),
+            });
+        }
+        Ok(self.path.join(relative))
+    }
+}
+
+impl Drop for Staging {
+    fn drop(&mut self) {
+        remove_folder(&self.path);
+        self.registry.lock().live.remove(&self.path);
+    }
+}
+
+/// A file in a staging folder. Call [`StagedFile::finish`]: dropping it may lose an error.
+pub struct StagedFile {
+    shown: PathBuf,
+    file: BufWriter<File>,
+}
+
+impl StagedFile {
+    /// Where the file will be once its folder is in place; what error messages name.
+    pub fn path(&self) -> &Path {
+        &self.shown
+    }
+
+    /// Writes what is buffered and waits until the disk has it.
+    pub fn finish(mut self) -> Result<(), ExportError> {
+        self.file
+            .flush()
+            .and_then(|()| self.file.get_ref().sync_all())
+            .map_err(ExportError::io(Action::Write, &self.shown))
+    }
+}
+
+impl Write for StagedFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Seek for StagedFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
+    }
+}
+
+/// Replaces a file in one step: a reader sees the old text or the new one. Used for the manifest.
+pub(crate) fn write_file_atomically(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).map_err(ExportError::io(Action::CreateFolder, folder))?;
+    let temporary = folder.join(staging_name());
+    let written = (|| {
+        let mut file = File::create(&temporary)?;
+        file.write_all(bytes)?;
+        file.sync_all()?;
+        fs::rename(&temporary, path)?;
+        sync_folder(folder)
+    })();
+    if written.is_err() {
+        let _ = fs::remove_file(&temporary);
+    }
+    written.map_err(ExportError::io(Action::Write, path))
+}
+
+/// All regular files under a folder, relative with forward slashes, in ascending order.
+pub fn list_files(folder: &Path) -> Result<Vec<String>, ExportError> {
+    let mut files = Vec::new();
+    let mut pending = vec![(folder.to_owned(), String::new())];
+    while let Some((path, prefix)) = pending.pop() {
+        let read = ExportError::io(Action::Read, &path);
+        let entries = fs::read_dir(&path).and_then(|e| e.collect::<io::Result<Vec<_>>>());
+        for entry in entries.map_err(read)? {
+            let kind = entry
+                .file_type()
+                .map_err(ExportError::io(Action::Read, &entry.path()))?;
+            let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
+            if kind.is_dir() {
+                pending.push((entry.path(), format!("{name}/")));
+            } else if kind.is_file() {
+                files.push(name);
+            }
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// The name, where it is one that a folder can have without meeting our own names.
+fn asset_name(name: &str) -> Result<&str, ExportError> {
+    let bad = name.is_empty()
+        || name.starts_with('.')
+        || name.contains(['/', '\\', '\0'])
+        || name == "manifest.jsonl";
+    if bad {
+        return Err(ExportError::AssetName { name: name.into() });
+    }
+    Ok(name)
+}
+
+/// Replacing deletes what was there, so it must be nothing, an empty folder, or an earlier atlas.
+fn check_target(target: &Path) -> Result<(), ExportError> {
+    let kind = match fs::symlink_metadata(target) {
+        Ok(metadata) => metadata.file_type(),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        Err(error) => return Err(ExportError::io(Action::Publish, target)(error)),
+    };
+    if !kind.is_dir() {
+        return Err(ExportError::NotAFolder {
+            path: target.into(),
+        });
+    }
+    let entries = fs::read_dir(target).and_then(|e| e.collect::<io::Result<Vec<_>>>());
+    let names = entries.map_err(ExportError::io(Action::Read, target))?;
+    let ours =
+        |name: &OsStr| name == "atlas.json" || name.to_string_lossy().starts_with("component-");
+    if names.is_empty() || names.iter().any(|e| ours(&e.file_name())) {
+        return Ok(());
+    }
+    Err(ExportError::ForeignFolder {
+        path: target.into(),
+    })
+}
+
+/// Waits until the disk has the entries of a folder and of all folders in it.
+fn sync_folders(folder: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        if entry.file_type()?.is_dir() {
+            sync_folders(&entry.path())?;
+        }
+    }
+    sync_folder(folder)
+}
+
+#[cfg(unix)]
+fn sync_folder(folder: &Path) -> io::Result<()> {
+    match File::open(folder)?.sync_all() {
+        // Some network file systems cannot sync folders; their renames are safe by themselves.
+        Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(()),
+        other => other,
+    }
+}
+
+#[cfg(not(unix))]
+fn sync_folder(_: &Path) -> io::Result<()> {
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

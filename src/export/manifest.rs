@@ -1,0 +1,257 @@
+//! `manifest.jsonl`: one line an asset, the record of what happened to it in the latest run.
+//!
+//! The only output file that holds wall time and memory. Lines stand in the order of the assets'
+//! ids; the file is replaced in one step, so that a reader never meets half a line.
+
+use crate::export::{Action, ExportError, folder};
+use crate::outcome::{AssetOutcome, AssetState, FailureKind};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+/// Name of the file in the output root.
+pub const FILE_NAME: &str = "manifest.jsonl";
+
+/// What became of an asset or a component.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum State {
+    /// Computed and written.
+    Built,
+    /// An earlier result of the same input and configuration was kept.
+    Cached,
+    /// Not built; see the kind and the error.
+    Failed,
+    /// Stopped by the user.
+    Cancelled,
+}
+
+/// The line of one asset.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    /// Name of the asset, which is also its folder.
+    pub id: String,
+    /// BLAKE3 hash of the input, hexadecimal; absent where it could not be read.
+    pub input_hash: Option<String>,
+    /// BLAKE3 hash of the effective configuration, hexadecimal.
+    pub config_hash: String,
+    /// What became of it. An asset of several components is built only if all of them are.
+    pub state: State,
+    /// Why it failed.
+    pub kind: Option<FailureKind>,
+    /// One sentence that says what to change.
+    pub error: Option<String>,
+    /// Wall time, seconds.
+    pub seconds: f64,
+    /// Peak memory of the process, bytes; absent where the system does not tell.
+    pub peak_memory: Option<u64>,
+    /// Files of the asset, relative to the output root, ascending. After a failure those of the older result, if any.
+    pub files: Vec<String>,
+    /// One entry a component, in order; empty where the input could not be read.
+    pub components: Vec<ComponentRecord>,
+}
+
+/// What became of one component.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ComponentRecord {
+    /// Number of the component, from 0.
+    pub component: usize,
+    /// What became of it.
+    pub state: State,
+    /// Why it failed.
+    pub kind: Option<FailureKind>,
+    /// One sentence that says what to change.
+    pub error: Option<String>,
+}
+
+impl Record {
+    /// The line of an asset that a job has finished with.
+    pub fn of(outcome: &AssetOutcome, config_hash: &str) -> Record {
+        let failure = outcome.failures().next().map(|(_, failure)| failure);
+        let components = outcome.components.iter().map(|c| {
+            let failure = c.result.as_ref().err();
+            ComponentRecord {
+                component: c.index,
+                state: failure.map_or(State::Built, |_| State::Failed),
+                kind: failure.map(|f| f.kind),
+                error: failure.map(|f| f.message.clone()),
+            }
+        });
+        Record {
+            id: outcome.id.clone(),
+            input_hash: outcome.input_hash.clone(),
+            config_hash: config_hash.to_owned(),
+            state: match (&outcome.state, failure) {
+                (AssetState::Cancelled, _) => State::Cancelled,
+                (_, Some(_)) => State::Failed,
+                _ => State::Built,
+            },
+            kind: failure.map(|f| f.kind),
+            error: failure.map(|f| f.message.clone()),
+            seconds: outcome.seconds,
+            peak_memory: peak_memory(),
+            files: outcome
+                .files
+                .iter()
+                .map(|file| format!("{}/{file}", outcome.id))
+                .collect(),
+            components: components.collect(),
+        }
+    }
+}
+
+/// Most memory that this process has held so far, bytes, where the system tells (Linux).
+fn peak_memory() -> Option<u64> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    kibibytes.checked_mul(1024)
+}
+
+/// All records of an output root.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Manifest {
+    records: BTreeMap<String, Record>,
+}
+
+impl Manifest {
+    /// Reads the manifest of an output root; a missing one is empty. Also gives the numbers (from 1) of lines
+    /// that are no records, such as those of another version: they are lost with the next [`Manifest::save`].
+    pub fn load(output_root: &Path) -> Result<(Manifest, Vec<usize>), ExportError> {
+        let path = output_root.join(FILE_NAME);
+        let bytes = match fs::read(&path) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
+            Err(error) => return Err(ExportError::io(Action::Read, &path)(error)),
+        };
+        let mut manifest = Manifest::default();
+        let mut unreadable = Vec::new();
+        for (number, line) in (1..).zip(bytes.split(|&b| b == b'\n')) {
+            if line.trim_ascii().is_empty() {
+                continue;
+            }
+            match serde_json::from_slice(line) {
+                Ok(record) => manifest.insert(record),
+                Err(_) => unreadable.push(number),
+            }
+        }
+        Ok((manifest, unreadable))
+    }
+
+    /// Adds a record in place of an older one of the same asset. A time that is not finite becomes 0.
+    pub fn insert(&mut self, mut record: Record) {
+        if !record.seconds.is_finite() {
+            record.seconds = 0.0;
+        }
+        self.records.insert(record.id.clone(), record);
+    }
+
+    /// The record of an asset.
+    pub fn get(&self, id: &str) -> Option<&Record> {
+        self.records.get(id)
+    }
+
+    /// All records, by id.
+    pub fn records(&self) -> impl ExactSizeIterator<Item = &Record> {
+        self.records.values()
+    }
+
+    /// The text of the file: one line a record.
+    pub fn to_text(&self) -> String {
+        let mut text = String::new();
+        for record in self.records.values() {
+            let line = serde_json::to_string(record)
+                .expect("string keys and no custom serialiser, so that serialisation cannot fail");
+            text.push_str(&line);
+            text.push('\n');
+        }
+        text
+    }
+
+    /// Replaces the file in one step.
+    pub fn save(&self, output_root: &Path) -> Result<(), ExportError> {
+        let path = output_root.join(FILE_NAME);
+        folder::write_file_atomically(&path, self.to_text().as_bytes())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(id: &str, state: State) -> Record {
+        Record {
+            id: id.into(),
+            input_hash: Some("00ff".into()),
+            config_hash: "ff00".into(),
+            state,
+            kind: (state == State::Failed).then_some(FailureKind::NotConverged),
+            error: (state == State::Failed).then(|| "raise the limit".into()),
+            seconds: 0.1 + 0.2,
+            peak_memory: Some(1 << 30),
+            files: vec![format!("{id}/atlas.json")],
+            components: vec![ComponentRecord {
+                component: 0,
+                state,
+                kind: None,
+                error: None,
+            }],
+        }
+    }
+
+    #[test]
+    fn a_manifest_reads_back_the_same_in_order_of_ids() {
+        let root = tempfile::tempdir().unwrap();
+        let mut manifest = Manifest::default();
+        for (id, state) in [
+            ("spot", State::Built),
+            ("cow", State::Failed),
+            ("bunny", State::Cached),
+        ] {
+            manifest.insert(record(id, state));
+        }
+        manifest.save(root.path()).unwrap();
+        let (back, unreadable) = Manifest::load(root.path()).unwrap();
+        assert_eq!(back, manifest);
+        assert!(unreadable.is_empty());
+        let ids: Vec<_> = back.records().map(|r| r.id.as_str()).collect();
+        assert_eq!(ids, ["bunny", "cow", "spot"]);
+        let text = fs::read_to_string(root.path().join(FILE_NAME)).unwrap();
+        assert!(
+            text.contains(r#""state":"failed","kind":"not_converged","error":"raise the limit""#),
+            "{text}"
+        );
+        assert_eq!(text.lines().count(), 3);
+    }
+
+    #[test]
+    fn a_newer_record_replaces_the_older_one() {
+        let mut manifest = Manifest::default();
+        manifest.insert(record("spot", State::Failed));
+        let mut newer = record("spot", State::Built);
+        newer.seconds = f64::NAN;
+        manifest.insert(newer);
+        assert_eq!(manifest.records().len(), 1);
+        assert_eq!(manifest.get("spot").unwrap().state, State::Built);
+        assert_eq!(manifest.get("spot").unwrap().seconds, 0.0);
+        assert!(manifest.get("cow").is_none());
+    }
+
+    #[test]
+    fn lines_that_are_no_records_are_counted() {
+        let root = tempfile::tempdir().unwrap();
+        assert_eq!(
+            Manifest::load(root.path()).unwrap(),
+            (Manifest::default(), vec![])
+        );
+        let mut manifest = Manifest::default();
+        manifest.insert(record("spot", State::Built));
+        let text = format!("garbage\n\n{}{{\"id\":3}}\n\u{fffd}", manifest.to_text());
+        fs::write(root.path().join(FILE_NAME), text).unwrap();
+        let (back, unreadable) = Manifest::load(root.path()).unwrap();
+        assert_eq!(back, manifest);
+        assert_eq!(unreadable, [1, 4, 5]);
+    }
+}

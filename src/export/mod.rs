@@ -1,0 +1,169 @@
+//! Writing what a job built: the folder of one asset as the output contract describes it.
+//!
+//! *Enters:* an [`AffineAtlas`] and its [`Provenance`]. *Leaves:* `atlas.json`, `atlas.npz`,
+//! `surface.glb` and `images/PPPP.exr` in a [`folder::Staging`] folder, which replaces the older
+//! folder in one step once it is complete.
+//!
+//! *Guaranteed:* the same atlas and provenance give the same bytes, whatever the machine and the
+//! number of threads; no file but the manifest holds wall time, memory or host names, and none
+//! holds an absolute path; a reader never sees a half-written folder.
+//! *Not guaranteed:* anything about the quality of the atlas. It is written as it is, as long as
+//! its arrays fit each other and its numbers are finite.
+
+pub mod atlas_json;
+mod error;
+pub mod exr;
+pub mod folder;
+pub mod glb;
+pub mod manifest;
+pub mod npz;
+pub mod periods;
+pub mod pictures;
+#[cfg(test)]
+pub(crate) mod sample;
+mod shapes;
+
+pub use error::{Action, EncodeError, ExportError};
+pub use shapes::check_shapes;
+
+use crate::geometry::mesh::{Appearance, Part};
+use crate::product::AffineAtlas;
+use folder::Staging;
+use rayon::prelude::*;
+use std::io;
+use std::path::Path;
+
+/// Where an atlas comes from: everything that its files say about the input and the configuration.
+#[derive(Clone, Copy, Debug)]
+pub struct Provenance<'a> {
+    /// Path of the input file as the user gave it. Of an absolute path only the file name is written.
+    pub path: &'a str,
+    /// BLAKE3 hash of the input (with everything it refers to), hexadecimal.
+    pub blake3: &'a str,
+    /// BLAKE3 hash of the effective configuration, hexadecimal.
+    pub config_blake3: &'a str,
+    /// Which component of the input this is, from 0.
+    pub component: usize,
+    /// How many components the input has.
+    pub components: usize,
+    /// Where the parts of the input begin in the running count of vertices and faces.
+    pub parts: &'a [Part],
+    /// Materials and textures of the input.
+    pub appearance: &'a Appearance,
+    /// Name of the asset.
+    pub asset: &'a str,
+}
+
+impl Provenance<'_> {
+    /// The path that goes into files: as given, with forward slashes, or the file name alone
+    /// where an absolute path would tell about the machine.
+    pub fn public_path(&self) -> String {
+        let slashes = self.path.replace('\\', "/");
+        let drive = slashes.as_bytes().get(1) == Some(&b':');
+        if slashes.starts_with('/') || drive || Path::new(self.path).is_absolute() {
+            let name = slashes.rsplit('/').next().unwrap_or_default();
+            return name.to_owned();
+        }
+        slashes
+    }
+}
+
+/// Writes all data files of one component into a staging folder: `atlas.json`, `atlas.npz`,
+/// `surface.glb` and the images. `subfolder` is `""` for an asset of one component, else
+/// [`folder::component_name`]. Gives the paths of the files inside the staging folder, in the order written.
+pub fn write_component(
+    staging: &Staging,
+    subfolder: &str,
+    atlas: &AffineAtlas,
+    provenance: &Provenance,
+) -> Result<Vec<String>, ExportError> {
+    check_shapes(atlas)?;
+    let document = atlas_json::describe(atlas, provenance)?;
+    let inside = |name: &str| match subfolder {
+        "" => name.to_owned(),
+        _ => format!("{subfolder}/{name}"),
+    };
+    let mut files = Vec::new();
+    let name = inside("atlas.json");
+    staging.write(&name, document.to_text().as_bytes())?;
+    files.push(name);
+
+    // Through memory: a zip writer that meets a full disk complains on the terminal when dropped.
+    let name = inside("atlas.npz");
+    let mut archive = io::Cursor::new(Vec::new());
+    npz::write(atlas, &mut archive).map_err(|e| e.at(&staging.target().join(&name)))?;
+    staging.write(&name, archive.get_ref())?;
+    files.push(name);
+
+    // Compression takes most of the time, and images do not depend on each other.
+    let images: Vec<_> = (atlas.images.par_iter().enumerate())
+        .map(|(id, image)| {
+            let name = inside(&atlas_json::image_path(id));
+            let mut file = staging.create(&name)?;
+            let label = exr::label(&document, id, provenance);
+            exr::write(image, &label, &mut file).map_err(|e| e.at(file.path()))?;
+            file.finish()?;
+            Ok(name)
+        })
+        .collect();
+    for name in images {
+        files.push(name?);
+    }
+
+    let name = inside("surface.glb");
+    let bytes = glb::encode(atlas, &document, provenance)?;
+    staging.write(&name, &bytes)?;
+    files.push(name);
+    Ok(files)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::PathBuf;
+
+    #[test]
+    fn absolute_paths_stay_out_of_files() {
+        let appearance = Appearance::default();
+        let mut provenance = sample::provenance(&appearance);
+        for (given, public) in [
+            ("models/a.obj", "models/a.obj"),
+            ("../a.obj", "../a.obj"),
+            ("/home/someone/a.obj", "a.obj"),
+            ("C:\\models\\a.obj", "a.obj"),
+            ("\\\\server\\share\\a.obj", "a.obj"),
+        ] {
+            provenance.path = given;
+            assert_eq!(provenance.public_path(), public);
+        }
+    }
+
+    /// With `AFFINE_ATLAS_SAMPLE_DIR` set, the folders stay there for checkers outside of this program.
+    #[test]
+    fn components_are_written_whole_and_the_same_every_time() {
+        let temporary = tempfile::tempdir().unwrap();
+        let kept = std::env::var_os("AFFINE_ATLAS_SAMPLE_DIR").map(PathBuf::from);
+        let root = kept.unwrap_or_else(|| temporary.path().to_owned());
+        let appearance = sample::appearance();
+        for (asset, atlas) in sample::all() {
+            let mut provenance = sample::provenance(&appearance);
+            provenance.asset = asset;
+            let mut contents = Vec::new();
+            for _ in 0..2 {
+                let staging = Staging::begin(&root, asset).unwrap();
+                let files = write_component(&staging, "", &atlas, &provenance).unwrap();
+                assert_eq!(
+                    files,
+                    ["atlas.json", "atlas.npz", "images/0000.exr", "surface.glb"]
+                );
+                staging.publish().unwrap();
+                let read = |name: &String| std::fs::read(root.join(asset).join(name)).unwrap();
+                contents.push(files.iter().map(read).collect::<Vec<_>>());
+            }
+            assert!(
+                contents[0] == contents[1],
+                "{asset} differs from run to run"
+            );
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! Pictures, rendered by the program itself: no display, no font file, the same bytes for any number of threads.
+//!
+//! *Enters:* an [`AffineAtlas`]. *Leaves:* images in memory.
+//!
+//! * [`preview`]: the surface in space with a checkerboard in flat coordinates, cones and cut.
+//! * [`log_scale`]: the surface in space coloured by the log scale.
+//! * [`layout()`]: the central chart and the packed patches in the plane.
+//! * [`convergence()`]: curvature error against flow time (Fig. 7 of the tutorial).
+//! * [`encode_png`]: an image as the bytes of a PNG file.
+//!
+//! Pictures of space are made in three steps: `view` looks for a direction that shows much of the
+//! surface, `light` bakes soft light into the vertices, and `raster` finds which triangle each sample of each
+//! pixel sees; what that sample looks like is computed afterwards, once a sample.
+//!
+//! Not guaranteed: equal bytes on different platforms (sines and powers differ in the last bit).
+
+mod canvas;
+mod checkerboard;
+mod colour;
+mod convergence;
+mod floor;
+mod layout;
+mod light;
+mod raster;
+mod scene;
+mod surface;
+mod text;
+mod view;
+
+pub use convergence::convergence;
+pub use layout::layout;
+pub use surface::{log_scale, preview};
+
+use crate::export::ExportError;
+use crate::export::folder::Staging;
+use crate::product::AffineAtlas;
+use image::ImageEncoder;
+
+/// Sides that pictures are held to, pixels: smaller ones show nothing, larger ones are a mistake.
+pub const SIDE_RANGE: [usize; 2] = [64, 8192];
+
+/// The size asked for, held to [`SIDE_RANGE`].
+fn side(size: usize) -> usize {
+    size.clamp(SIDE_RANGE[0], SIDE_RANGE[1])
+}
+
+/// Draws all pictures of an atlas into a staging folder; `subfolder` as for
+/// [`write_component`](crate::export::write_component).
+pub fn write(
+    staging: &Staging,
+    subfolder: &str,
+    atlas: &AffineAtlas,
+    size: usize,
+) -> Result<(), ExportError> {
+    // One view and one light for both pictures of space.
+    let studio = surface::Studio::new(atlas, size);
+    let pictures = [
+        ("preview.png", studio.preview()),
+        ("layout.png", layout(atlas, size)),
+        ("log-scale.png", studio.log_scale()),
+        ("convergence.png", convergence(atlas, size)),
+    ];
+    for (name, picture) in pictures {
+        let path = match subfolder {
+            "" => name.to_owned(),
+            _ => format!("{subfolder}/{name}"),
+        };
+        let bytes = encode_png(&picture).map_err(|error| ExportError::Encode {
+            path: staging.target().join(&path),
+            message: error.to_string(),
+        })?;
+        staging.write(&path, &bytes)?;
+    }
+    Ok(())
+}
+
+/// An image as a PNG file in memory.
+pub fn encode_png(image: &image::RgbImage) -> Result<Vec<u8>, image::ImageError> {
+    use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+    let mut bytes = Vec::new();
+    PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive)
+        .write_image(
+            image.as_raw(),
+            image.width(),
+            image.height(),
+            image::ExtendedColorType::Rgb8,
+        )?;
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,173 @@
+//! What became of an asset: what a job tells the command line and the manifest.
+
+use crate::product::AffineAtlas;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// Why an asset or a component was not built (`kind` in the manifest).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FailureKind {
+    /// The input file was refused.
+    Input,
+    /// The curvature asked for cannot exist.
+    Prescription,
+    /// The flow did not reach the curvature asked for.
+    NotConverged,
+    /// Took longer than allowed.
+    Timeout,
+    /// Needed more memory than allowed.
+    Memory,
+    /// The result could not be written.
+    Output,
+    /// An error of this program.
+    Internal,
+}
+
+impl FailureKind {
+    /// The word of the output contract.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Input => "input",
+            Self::Prescription => "prescription",
+            Self::NotConverged => "not_converged",
+            Self::Timeout => "timeout",
+            Self::Memory => "memory",
+            Self::Output => "output",
+            Self::Internal => "internal",
+        }
+    }
+}
+
+/// A refusal or failure.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Failure {
+    /// Which sort.
+    pub kind: FailureKind,
+    /// One sentence that says what was wrong, and what to change.
+    pub message: String,
+}
+
+/// The figures that the final summary shows of a built component.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// Vertices of the surface the charts are defined on.
+    pub vertices: usize,
+    /// Its faces.
+    pub faces: usize,
+    /// Its genus.
+    pub genus: usize,
+    /// Its boundary loops.
+    pub boundary_loops: usize,
+    /// Cones.
+    pub cones: usize,
+    /// max |K − K̄| over the prescribed vertices, radians.
+    pub max_curvature_error: f64,
+    /// (9), both areas normalised to 1.
+    pub area_distortion: f64,
+    /// Folder that was written.
+    pub folder: PathBuf,
+}
+
+impl Summary {
+    /// The figures of an atlas that was written to `folder`.
+    #[must_use]
+    pub fn of(atlas: &AffineAtlas, folder: PathBuf) -> Self {
+        Self {
+            vertices: atlas.topology.vertices,
+            faces: atlas.topology.faces,
+            genus: atlas.topology.genus as usize,
+            boundary_loops: atlas.topology.boundary_loops,
+            cones: atlas.prescription.cones.len(),
+            max_curvature_error: atlas.metric.max_curvature_error,
+            area_distortion: atlas.quality.area_distortion,
+            folder,
+        }
+    }
+}
+
+/// What became of one component.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ComponentOutcome {
+    /// Which, from 0.
+    pub index: usize,
+    /// Figures, or why not.
+    pub result: Result<Summary, Failure>,
+}
+
+/// What became of one asset as a whole.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AssetState {
+    /// Every component was built, unless `components` says otherwise.
+    Built,
+    /// Nothing was built for a reason that concerns the whole file.
+    Failed(Failure),
+    /// Stopped by the user.
+    Cancelled,
+}
+
+/// What became of one asset.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AssetOutcome {
+    /// Its id.
+    pub id: String,
+    /// As a whole.
+    pub state: AssetState,
+    /// Component by component; empty where the file was not even separated into components.
+    pub components: Vec<ComponentOutcome>,
+    /// Wall time.
+    pub seconds: f64,
+    /// Files of the asset, relative to its folder; after a failure those of an earlier run.
+    pub files: Vec<String>,
+    /// BLAKE3 hash of the input, hexadecimal; absent where it could not be read.
+    pub input_hash: Option<String>,
+    /// What the reader left out.
+    pub notes: Vec<String>,
+}
+
+impl AssetOutcome {
+    /// The outcome of an asset of which no component was looked at.
+    #[must_use]
+    pub fn whole(id: &str, state: AssetState, seconds: f64) -> Self {
+        Self {
+            id: id.to_owned(),
+            state,
+            components: Vec::new(),
+            seconds,
+            files: Vec::new(),
+            input_hash: None,
+            notes: Vec::new(),
+        }
+    }
+
+    /// The outcome of an asset that failed as a whole.
+    #[must_use]
+    pub fn failed(id: &str, failure: Failure, seconds: f64) -> Self {
+        Self::whole(id, AssetState::Failed(failure), seconds)
+    }
+
+    /// Every failure, with its component where it concerns only one.
+    pub fn failures(&self) -> impl Iterator<Item = (Option<usize>, &Failure)> {
+        let whole = match &self.state {
+            AssetState::Failed(failure) => Some((None, failure)),
+            AssetState::Built | AssetState::Cancelled => None,
+        };
+        let parts = self.components.iter().filter_map(|component| {
+            let failure = component.result.as_ref().err()?;
+            Some((Some(component.index), failure))
+        });
+        whole.into_iter().chain(parts)
+    }
+
+    /// The word of the output contract: `built`, `failed` (also where only a component failed) or
+    /// `cancelled`.
+    #[must_use]
+    pub fn state_name(&self) -> &'static str {
+        match self.state {
+            AssetState::Cancelled => "cancelled",
+            AssetState::Built if self.failures().next().is_none() => "built",
+            AssetState::Built | AssetState::Failed(_) => "failed",
+        }
+    }
+}

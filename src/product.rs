@@ -1,0 +1,105 @@
+//! What a job yields for one component: the affine atlas with everything that is written of it.
+
+use crate::atlas::charts::Charts;
+use crate::atlas::cut::CutGraph;
+use crate::atlas::develop::Development;
+use crate::atlas::geometry_image::GeometryImage;
+use crate::atlas::patches::PatchLayout;
+use crate::flow::cones::Prescription;
+use crate::flow::ricci::{FlatMetric, FlowParams};
+use crate::geometry::connectivity::Topology;
+use crate::geometry::mesh::Mesh;
+use serde::{Deserialize, Serialize};
+
+/// A built component.
+#[derive(Clone, Debug)]
+pub struct AffineAtlas {
+    /// Surface after repair and connectivity repair.
+    pub mesh: Mesh,
+    /// Its counts.
+    pub topology: Topology,
+    /// Prescribed curvature.
+    pub prescription: Prescription,
+    /// How the flow was asked to run.
+    pub flow: FlowParams,
+    /// Flat cone metric.
+    pub metric: FlatMetric,
+    /// Cut graph.
+    pub cut: CutGraph,
+    /// Central chart.
+    pub central: Development,
+    /// Boundary and node charts, transitions, gluings.
+    pub charts: Charts,
+    /// Patches and seams.
+    pub patches: PatchLayout,
+    /// One image a patch.
+    pub images: Vec<GeometryImage>,
+    /// Added to image positions to give source coordinates.
+    pub image_origin: [f64; 3],
+    /// What repair changed: counts by name, as `atlas.json` lists them.
+    pub repair: std::collections::BTreeMap<String, u64>,
+    /// What connectivity repair changed.
+    pub connectivity_repair: ConnectivityRepair,
+    /// Measured from the data above, not taken from any stage.
+    pub quality: Quality,
+    /// True where every gluing is a quarter turn to 1e-8.
+    pub seamless: bool,
+}
+
+/// What connectivity repair changed (tutorial 5.3).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ConnectivityRepair {
+    /// Edge and face splits.
+    pub splits: usize,
+    /// Edge flips.
+    pub flips: usize,
+    /// Hausdorff distance to the surface before, source units; 0 for splits.
+    pub hausdorff: f64,
+}
+
+/// Minimum, maximum and standard deviation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Spread {
+    /// Least value.
+    pub min: f64,
+    /// Greatest value.
+    pub max: f64,
+    /// Standard deviation, weighted by source area.
+    pub std: f64,
+}
+
+/// Mean and maximum.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MeanMax {
+    /// Mean, weighted by source area.
+    pub mean: f64,
+    /// Greatest value.
+    pub max: f64,
+}
+
+/// How well the atlas turned out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Quality {
+    /// (9), both areas normalised to 1.
+    pub area_distortion: f64,
+    /// ½ ln(flat area / source area) a face, both totals 1, weighted by source area.
+    pub log_scale: Spread,
+    /// Difference of corner angles, radians.
+    pub angle_error: MeanMax,
+    /// Worst mismatch of the development, source units.
+    pub layout_closing_error: f64,
+    /// Length of the cut in space, source units.
+    pub cut_length: f64,
+    /// Worst residual of all transitions and gluings, relative to the chart's diameter.
+    pub transition_residual: f64,
+    /// Worst |holonomy − K̄| (mod 2π) around a vertex of the cut, radians.
+    pub holonomy_error: f64,
+    /// Worst mismatch of the cocycle over shared faces, relative to the chart's diameter.
+    pub cocycle_error: f64,
+    /// 20 log10(bounding-box diagonal / RMS distance) of the surface rebuilt from the images; absent where not measured.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub image_psnr_db: Option<f64>,
+    /// Largest distance between the surface and the one rebuilt from the images; absent where not measured.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub image_hausdorff: Option<f64>,
+}
