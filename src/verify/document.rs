@@ -1,0 +1,377 @@
+//! `atlas.json`: its keys, its types, and that its indices point somewhere.
+
+use super::Verdicts;
+use super::formulas::{Motion, Point2, Point3};
+use serde::Deserialize;
+use serde_json::Value;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Component, Path};
+
+/// Largest `atlas.json` that is read (bytes).
+const SIZE_LIMIT: u64 = 1 << 30;
+
+/// Keys that must be there, by object.
+const KEYS: [(&str, &[&str]); 7] = [
+    (
+        "source",
+        &["path", "blake3", "config_blake3", "component", "components"],
+    ),
+    (
+        "topology",
+        &[
+            "vertices",
+            "edges",
+            "faces",
+            "euler_characteristic",
+            "genus",
+            "boundary_loops",
+        ],
+    ),
+    ("repair", &[]),
+    ("connectivity", &["splits", "flips", "hausdorff"]),
+    (
+        "metric",
+        &[
+            "scheme",
+            "solver",
+            "boundary",
+            "iterations",
+            "max_curvature_error",
+            "history",
+        ],
+    ),
+    (
+        "quality",
+        &[
+            "area_distortion",
+            "log_scale",
+            "angle_error",
+            "layout_closing_error",
+            "cut_length",
+        ],
+    ),
+    ("flags", &["seamless"]),
+];
+
+/// Lists that must be there.
+const LISTS: [&str; 5] = ["cones", "segments", "charts", "transitions", "patches"];
+
+/// What the checks use of `atlas.json`.
+#[derive(Debug, Deserialize)]
+pub(super) struct Document {
+    pub generator: Option<Value>,
+    pub source: Source,
+    pub topology: Topology,
+    pub metric: Metric,
+    pub cones: Vec<Cone>,
+    pub segments: Vec<Segment>,
+    pub charts: Vec<Chart>,
+    pub transitions: Vec<Transition>,
+    pub patches: Vec<Patch>,
+    pub quality: Quality,
+    #[serde(default)]
+    pub image_origin: Point3,
+    pub flags: Flags,
+    pub periods: Option<[Point2; 2]>,
+}
+
+impl Document {
+    /// Whether a program wrote it, which must then keep the whole contract.
+    pub fn is_generated(&self) -> bool {
+        self.generator.is_some()
+    }
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Source {
+    pub blake3: String,
+    pub config_blake3: String,
+    pub component: u64,
+    pub components: u64,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Topology {
+    pub vertices: u64,
+    pub edges: u64,
+    pub faces: u64,
+    pub euler_characteristic: i64,
+    pub genus: i64,
+    pub boundary_loops: i64,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Metric {
+    pub boundary: String,
+    pub max_curvature_error: f64,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Cone {
+    pub vertex: usize,
+    pub curvature: f64,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Gluing {
+    pub rotation: f64,
+    pub translation: Point2,
+    pub residual: Option<f64>,
+    pub quarter_turns: Option<i64>,
+}
+
+impl Gluing {
+    pub fn motion(&self) -> Motion {
+        Motion {
+            rotation: self.rotation,
+            translation: self.translation,
+        }
+    }
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Segment {
+    pub id: usize,
+    pub from: usize,
+    pub to: usize,
+    pub vertices: Vec<usize>,
+    pub gluing: Gluing,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Chart {
+    pub id: Option<usize>,
+    pub kind: String,
+    pub segment: Option<usize>,
+    pub vertex: Option<usize>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Transition {
+    pub from: usize,
+    pub to: usize,
+    #[serde(default)]
+    pub sector: u8,
+    pub rotation: f64,
+    pub translation: Point2,
+    pub residual: Option<f64>,
+    pub faces: Option<usize>,
+    pub quarter_turns: Option<i64>,
+}
+
+impl Transition {
+    pub fn motion(&self) -> Motion {
+        Motion {
+            rotation: self.rotation,
+            translation: self.translation,
+        }
+    }
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Similarity {
+    pub scale: f64,
+    pub rotation: f64,
+    pub translation: Point2,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Patch {
+    pub id: usize,
+    pub image: String,
+    pub domain: String,
+    pub width: usize,
+    pub height: usize,
+    pub texel_to_patch: [[f64; 3]; 2],
+    pub patch_to_chart: Option<Similarity>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Spread {
+    pub min: f64,
+    pub max: f64,
+    pub std: f64,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct MeanMax {
+    pub mean: f64,
+    pub max: f64,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Quality {
+    pub area_distortion: f64,
+    pub log_scale: Spread,
+    pub angle_error: MeanMax,
+    pub layout_closing_error: f64,
+    pub cut_length: f64,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Flags {
+    pub seamless: bool,
+}
+
+/// Whether a path stays inside the folder that it is relative to.
+pub(super) fn is_inside(path: &str) -> bool {
+    let mut parts = Path::new(path).components().peekable();
+    parts.peek().is_some() && parts.all(|part| matches!(part, Component::Normal(_)))
+}
+
+/// A file's bytes, if there are at most `limit` of them.
+pub(super) fn read_bounded(path: &Path, limit: u64) -> Result<Vec<u8>, String> {
+    let file = File::open(path).map_err(|error| error.to_string())?;
+    let mut bytes = Vec::new();
+    file.take(limit + 1)
+        .read_to_end(&mut bytes)
+        .map_err(|error| error.to_string())?;
+    if bytes.len() as u64 > limit {
+        return Err(format!("is larger than {limit} bytes"));
+    }
+    Ok(bytes)
+}
+
+fn parse(folder: &Path) -> Result<Value, String> {
+    let bytes = read_bounded(&folder.join("atlas.json"), SIZE_LIMIT)?;
+    serde_json::from_slice(&bytes).map_err(|error| error.to_string())
+}
+
+/// The number of the component that an atlas says it is.
+pub(super) fn component(folder: &Path) -> Option<u64> {
+    parse(folder).ok()?["source"]["component"].as_u64()
+}
+
+/// Reads `atlas.json`; `None` where it cannot be used, after a failed check that says why.
+pub(super) fn read(folder: &Path, verdicts: &mut Verdicts) -> Option<Document> {
+    let value = match parse(folder) {
+        Ok(value) => value,
+        Err(error) => {
+            verdicts.note("atlas.json can be read", false, error);
+            return None;
+        }
+    };
+    verdicts.note(
+        "format",
+        value["format"] == "affine-atlas" && value["version"] == 1,
+        "",
+    );
+    let lacking = lacking_keys(&value);
+    let complete = verdicts.note(
+        "atlas.json has every key",
+        lacking.is_empty(),
+        lacking[..lacking.len().min(6)].join(" "),
+    );
+    if !complete {
+        return None;
+    }
+    let document: Document = match serde_json::from_value(value) {
+        Ok(document) => document,
+        Err(error) => {
+            verdicts.note("atlas.json's values have their types", false, error);
+            return None;
+        }
+    };
+    let stray = stray_ids(&document);
+    let sound = verdicts.note(
+        "atlas.json's ids point to its lists",
+        stray.is_empty(),
+        stray[..stray.len().min(4)].join(", "),
+    );
+    sound.then_some(document)
+}
+
+fn lacking_keys(value: &Value) -> Vec<String> {
+    let mut lacking = Vec::new();
+    for (object, keys) in &KEYS {
+        if !value[object].is_object() {
+            lacking.push((*object).to_owned());
+            continue;
+        }
+        for key in keys.iter().filter(|key| value[object].get(**key).is_none()) {
+            lacking.push(format!("{object}.{key}"));
+        }
+    }
+    for list in LISTS.iter().filter(|list| !value[**list].is_array()) {
+        lacking.push((*list).to_owned());
+    }
+    lacking
+}
+
+/// Ids that are not their row, and ids of rows that are not there (vertices and faces are tested elsewhere).
+fn stray_ids(document: &Document) -> Vec<String> {
+    let mut stray = Vec::new();
+    let (segments, charts) = (document.segments.len(), document.charts.len());
+    let source = &document.source;
+    if source.component >= source.components {
+        stray.push(format!(
+            "component {} of {}",
+            source.component, source.components
+        ));
+    }
+    for (row, segment) in document.segments.iter().enumerate() {
+        if segment.id != row {
+            stray.push(format!("segment {} in row {row}", segment.id));
+        }
+        if segment.vertices.len() < 2 {
+            stray.push(format!("segment {row} of fewer than two vertices"));
+        }
+    }
+    for (row, chart) in document.charts.iter().enumerate() {
+        if chart.id.is_some_and(|id| id != row) {
+            stray.push(format!("another id in row {row} of charts"));
+        }
+        let complete = match chart.kind.as_str() {
+            "central" => row == 0,
+            "boundary" => chart.segment.is_some_and(|segment| segment < segments),
+            "node" => chart.vertex.is_some(),
+            _ => false,
+        };
+        if !complete {
+            stray.push(format!("chart {row} of kind {}", chart.kind));
+        }
+    }
+    for transition in &document.transitions {
+        if transition.from != 0 || transition.to == 0 || transition.to >= charts {
+            stray.push(format!(
+                "transition from {} to {}",
+                transition.from, transition.to
+            ));
+        }
+    }
+    for (row, patch) in document.patches.iter().enumerate() {
+        if patch.id != row {
+            stray.push(format!("patch {} in row {row}", patch.id));
+        }
+        if !is_inside(&patch.image) {
+            stray.push(format!("image {:?} outside the folder", patch.image));
+        }
+        if patch.domain != "flat" && patch.domain != "rectangle" {
+            stray.push(format!("patch {row} of domain {}", patch.domain));
+        }
+    }
+    stray
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_must_stay_inside() {
+        assert!(is_inside("images/0000.exr"));
+        for path in ["", ".", "..", "/etc/passwd", "images/../../x"] {
+            assert!(!is_inside(path), "{path}");
+        }
+    }
+
+    #[test]
+    fn lacking_keys_are_named_with_their_object() {
+        let value = serde_json::json!({ "source": { "path": "a" }, "cones": {} });
+        let lacking = lacking_keys(&value);
+        assert!(lacking.contains(&"source.blake3".to_owned()));
+        assert!(!lacking.contains(&"source.path".to_owned()));
+        assert!(lacking.contains(&"cones".to_owned()));
+    }
+}

@@ -1,0 +1,321 @@
+//! Reads an output folder back, with nothing else, and checks every invariant of an affine atlas.
+//!
+//! Enters: a folder that holds `atlas.json`, `atlas.npz`, `images/*.exr` and `surface.glb`, or components, or
+//! assets. Leaves: [`Verdicts`], one line a check with the measured figure.
+//!
+//! Guaranteed: shares no code with the stages that made the data (its own readers, halfedge pairing and
+//! formulas), tests every face, texel and sample, never panics and never allocates more than a fixed
+//! multiple of what the files hold, whatever they hold. A check that could not run because its data is
+//! broken is preceded by the failed check that says so.
+//!
+//! Not guaranteed: that the atlas belongs to a given source mesh, unless [`verify_against`] is given one.
+//!
+//! A folder whose `atlas.json` has no `generator` is taken as hand-made: it may lack `surface.glb`, the text
+//! attribute of the images, `quarter_turns` and seams along the surface's boundary.
+
+mod arrays;
+mod central;
+mod charts;
+mod document;
+mod formulas;
+mod glb;
+mod grid;
+mod images;
+mod metric;
+mod npz;
+mod patches;
+mod quality;
+mod seams;
+mod source;
+mod surface;
+mod transitions;
+
+use serde::Serialize;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+pub use source::SourceSurface;
+
+/// Options of [`verify`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct VerifyOptions {
+    /// Largest number of cones that was prescribed; an atlas with more fails. Not checked where absent.
+    pub cones: Option<usize>,
+    /// Largest gap across edges and gluings, relative to the chart's diameter.
+    pub tolerance: f64,
+    /// Largest range of the log scale inside a patch (natural logarithm of the length scale) that was asked
+    /// for, over single well-shaped faces (a bound on averages over regions is weaker); where absent the range
+    /// is only measured.
+    pub log_scale_range: Option<f64>,
+}
+
+impl Default for VerifyOptions {
+    fn default() -> Self {
+        Self {
+            cones: None,
+            tolerance: 1e-8,
+            log_scale_range: None,
+        }
+    }
+}
+
+/// Why nothing could be verified at all.
+#[derive(Debug, thiserror::Error)]
+pub enum VerifyError {
+    /// The folder is not there or cannot be listed.
+    #[error(
+        "cannot read the folder {}: {source}; give the folder of an asset, or the output folder that holds several",
+        path.display()
+    )]
+    Folder {
+        /// As given.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The folder holds no atlas.
+    #[error(
+        "{} holds no atlas.json, no component-000 and no manifest.jsonl; give the folder of an asset, or the output folder that holds several",
+        path.display()
+    )]
+    NothingToVerify {
+        /// As given.
+        path: PathBuf,
+    },
+}
+
+/// One check.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Check {
+    /// What must hold; where several atlases were verified, after the atlas's folder and `: `.
+    pub name: String,
+    /// Whether it holds.
+    pub passed: bool,
+    /// The measured figure, or what is wrong.
+    pub figure: String,
+}
+
+/// All checks of one run. `Display` gives a line a check and a total.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Verdicts {
+    /// In the order in which they ran.
+    pub checks: Vec<Check>,
+}
+
+impl Verdicts {
+    /// Number of checks that failed.
+    pub fn failed(&self) -> usize {
+        self.checks.iter().filter(|check| !check.passed).count()
+    }
+
+    /// Whether every check passed; false where there was none.
+    pub fn all_passed(&self) -> bool {
+        !self.checks.is_empty() && self.failed() == 0
+    }
+
+    fn note(&mut self, name: &str, passed: bool, figure: impl fmt::Display) -> bool {
+        self.checks.push(Check {
+            name: name.to_owned(),
+            passed,
+            figure: figure.to_string(),
+        });
+        passed
+    }
+
+    fn append(&mut self, part: &str, mut other: Verdicts) {
+        for check in &mut other.checks {
+            check.name = format!("{part}: {}", check.name);
+        }
+        self.checks.append(&mut other.checks);
+    }
+}
+
+impl fmt::Display for Verdicts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for check in &self.checks {
+            let verdict = if check.passed { "ok    " } else { "FAIL  " };
+            let gap = if check.figure.is_empty() { "" } else { "  " };
+            writeln!(f, "{verdict}{}{gap}{}", check.name, check.figure)?;
+        }
+        let failed = self.failed();
+        write!(f, "{} passed, {failed} failed", self.checks.len() - failed)
+    }
+}
+
+/// Verifies an asset's folder, every component of it, or every asset of an output folder.
+///
+/// # Errors
+/// Only where there is nothing to verify; whatever is wrong with an atlas is a failed check.
+pub fn verify(folder: &Path, options: &VerifyOptions) -> Result<Verdicts, VerifyError> {
+    verify_against(folder, options, None)
+}
+
+/// Like [`verify`], and compares with the mesh that the atlas was made from, in the file's own vertex and
+/// face order.
+///
+/// # Errors
+/// As [`verify`].
+pub fn verify_against(
+    folder: &Path,
+    options: &VerifyOptions,
+    source: Option<&SourceSurface<'_>>,
+) -> Result<Verdicts, VerifyError> {
+    if folder.join("manifest.jsonl").is_file() {
+        let mut verdicts = Verdicts::default();
+        verify_manifest(folder, options, source, &mut verdicts);
+        return Ok(verdicts);
+    }
+    verify_asset(folder, options, source)
+}
+
+/// An atlas, or one a component.
+fn verify_asset(
+    folder: &Path,
+    options: &VerifyOptions,
+    source: Option<&SourceSurface<'_>>,
+) -> Result<Verdicts, VerifyError> {
+    let unreadable = |source| VerifyError::Folder {
+        path: folder.to_owned(),
+        source,
+    };
+    let mut components = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(unreadable)? {
+        let name = entry.map_err(unreadable)?.file_name();
+        if let Some(name) = name.to_str().filter(|name| name.starts_with("component-")) {
+            components.push(name.to_owned());
+        }
+    }
+    components.sort();
+    let mut verdicts = Verdicts::default();
+    if folder.join("atlas.json").exists() {
+        verdicts = verify_atlas(folder, options, source);
+    } else if components.is_empty() {
+        return Err(VerifyError::NothingToVerify {
+            path: folder.to_owned(),
+        });
+    }
+    for name in components {
+        let number = name.trim_start_matches("component-").parse().ok();
+        let path = folder.join(&name);
+        let part = verify_atlas(&path, options, source);
+        verdicts.append(&name, part);
+        let stated = document::component(&path);
+        verdicts.note(
+            &format!("{name}: component is the one its folder names"),
+            number.is_some() && stated == number,
+            match stated {
+                Some(stated) => format!("component {stated}"),
+                None => "atlas.json states none".to_owned(),
+            },
+        );
+    }
+    Ok(verdicts)
+}
+
+/// Every asset that the manifest calls built, or of which it lists files, must be there with them.
+fn verify_manifest(
+    folder: &Path,
+    options: &VerifyOptions,
+    source: Option<&SourceSurface<'_>>,
+    verdicts: &mut Verdicts,
+) {
+    let text = match std::fs::read_to_string(folder.join("manifest.jsonl")) {
+        Ok(text) => text,
+        Err(error) => {
+            verdicts.note("manifest.jsonl can be read", false, error);
+            return;
+        }
+    };
+    let mut built = 0;
+    for (row, line) in text
+        .lines()
+        .enumerate()
+        .filter(|(_, l)| !l.trim().is_empty())
+    {
+        let record: serde_json::Value = match serde_json::from_str(line) {
+            Ok(record) => record,
+            Err(error) => {
+                let figure = format!("line {}: {error}", row + 1);
+                verdicts.note("manifest.jsonl holds one JSON object a line", false, figure);
+                continue;
+            }
+        };
+        let Some(id) = record["id"].as_str().filter(|id| document::is_inside(id)) else {
+            let figure = format!("line {} has no usable id", row + 1);
+            verdicts.note("manifest.jsonl names its assets", false, figure);
+            continue;
+        };
+        let listed: Vec<&str> = record["files"]
+            .as_array()
+            .map(|files| files.iter().filter_map(|file| file.as_str()).collect())
+            .unwrap_or_default();
+        // An asset may have failed and still hold components that were built, or an older result.
+        let complete = matches!(record["state"].as_str(), Some("built" | "cached"));
+        if !complete && listed.is_empty() {
+            continue;
+        }
+        built += 1;
+        let absent: Vec<&str> = listed
+            .iter()
+            .copied()
+            .filter(|file| {
+                !document::is_inside(file)
+                    || !(folder.join(file).is_file() || folder.join(id).join(file).is_file())
+            })
+            .collect();
+        verdicts.note(
+            &format!("{id}: files listed in the manifest exist"),
+            absent.is_empty(),
+            format!(
+                "{} absent of {} {}",
+                absent.len(),
+                listed.len(),
+                absent.join(" ")
+            ),
+        );
+        match verify_asset(&folder.join(id), options, source) {
+            Ok(part) => verdicts.append(id, part),
+            Err(error) => {
+                verdicts.note(&format!("{id}: the asset's folder is there"), false, error);
+            }
+        }
+    }
+    verdicts.note(
+        "manifest.jsonl lists built assets",
+        built > 0,
+        format!("{built} built"),
+    );
+}
+
+/// One folder with one `atlas.json`.
+fn verify_atlas(
+    folder: &Path,
+    options: &VerifyOptions,
+    source: Option<&SourceSurface<'_>>,
+) -> Verdicts {
+    let mut verdicts = Verdicts::default();
+    let Some(document) = document::read(folder, &mut verdicts) else {
+        return verdicts;
+    };
+    let Some(arrays) = arrays::read(folder, &document, &mut verdicts) else {
+        return verdicts;
+    };
+    let surface = surface::Surface::new(&arrays);
+    surface::check(&surface, &arrays, &document, &mut verdicts);
+    let metric = metric::check(&surface, &arrays, &document, options, &mut verdicts);
+    let slit = central::check(&surface, &arrays, &document, options, &mut verdicts);
+    transitions::check(&surface, &arrays, &document, &slit, &metric, &mut verdicts);
+    charts::check(&surface, &arrays, &document, &slit, &mut verdicts);
+    if let Some(source) = source {
+        source::check(&arrays, &document, source, &mut verdicts);
+    }
+    quality::check(&arrays, &document, &metric, &mut verdicts);
+    if let Some(groups) =
+        patches::check(&surface, &arrays, &document, options, &slit, &mut verdicts)
+    {
+        images::check(folder, &arrays, &document, &groups, &mut verdicts);
+        seams::check(&surface, &arrays, &document, &mut verdicts);
+    }
+    glb::check(folder, &arrays, &document, &mut verdicts);
+    verdicts
+}

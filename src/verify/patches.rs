@@ -1,0 +1,353 @@
+//! Patches: connected, continuous, similar to the central chart, injective, of bounded scale.
+
+use super::arrays::{Arrays, NONE};
+use super::central::{FLOOR, LENGTH_TOLERANCE, Slit, at_corner};
+use super::document::{Document, Patch};
+use super::formulas::{
+    Extent2, Point2, Worst, area_from_lengths, area3, corner_angles, distance2, is_positive,
+    least_sine, lengths2, lengths3, longest, rotate,
+};
+use super::grid::Grid;
+use super::surface::{Surface, UnionFind};
+use super::{Verdicts, VerifyOptions};
+use rayon::prelude::*;
+
+/// Faces overlap where they share more than this, in diameters of the patch.
+const OVERLAP_TOLERANCE: f64 = 1e-9;
+/// Largest distance between the central chart and a patch moved onto it, in diameters of the chart.
+const SIMILARITY_TOLERANCE: f64 = 1e-7;
+
+/// Faces of every patch, ascending.
+pub(super) struct Groups {
+    start: Vec<usize>,
+    faces: Vec<u32>,
+}
+
+impl Groups {
+    fn new(patch: &[u32], patches: usize) -> Self {
+        let mut start = vec![0; patches + 1];
+        for p in patch {
+            start[*p as usize + 1] += 1;
+        }
+        for p in 0..patches {
+            start[p + 1] += start[p];
+        }
+        let mut next = start.clone();
+        let mut faces = vec![0; patch.len()];
+        for (face, p) in (0u32..).zip(patch) {
+            faces[next[*p as usize]] = face;
+            next[*p as usize] += 1;
+        }
+        Self { start, faces }
+    }
+
+    /// Faces of a patch.
+    pub fn of(&self, patch: usize) -> &[u32] {
+        &self.faces[self.start[patch]..self.start[patch + 1]]
+    }
+}
+
+/// What is measured of one patch.
+struct Measured {
+    shape: f64,
+    flipped: bool,
+    dissimilar: bool,
+    overlap: Overlap,
+    log_scale_range: f64,
+}
+
+/// What came of looking for overlaps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Overlap {
+    /// There is none.
+    None,
+    /// These two triangles do.
+    Pair(usize, usize),
+    /// Too many long and thin triangles to be decided in bounded work.
+    Undecided,
+}
+
+pub(super) fn check(
+    surface: &Surface<'_>,
+    arrays: &Arrays,
+    document: &Document,
+    options: &VerifyOptions,
+    slit: &Slit,
+    verdicts: &mut Verdicts,
+) -> Option<Groups> {
+    let patches = document.patches.len();
+    let stray = arrays
+        .patch
+        .iter()
+        .filter(|p| **p as usize >= patches)
+        .count();
+    if !verdicts.note(
+        "every face in a patch",
+        stray == 0,
+        format!("{patches} patches, {stray} faces outside"),
+    ) {
+        return None;
+    }
+    let groups = Groups::new(&arrays.patch, patches);
+    let empty = (0..patches).filter(|p| groups.of(*p).is_empty()).count();
+    verdicts.note(
+        "every patch has faces",
+        empty == 0,
+        format!("{empty} empty"),
+    );
+    check_inside(surface, arrays, &groups, options, verdicts);
+    let measured: Vec<Measured> = document
+        .patches
+        .par_iter()
+        .map(|patch| measure(arrays, patch, groups.of(patch.id), slit))
+        .collect();
+    let mut shape = Worst::default();
+    let mut range = Worst::default();
+    let mut overlapping = Vec::new();
+    let mut bad = 0;
+    for (id, m) in measured.iter().enumerate() {
+        shape.see(m.shape);
+        range.see(m.log_scale_range);
+        match m.overlap {
+            Overlap::None => {}
+            Overlap::Pair(a, b) => {
+                let (a, b) = (groups.of(id)[a], groups.of(id)[b]);
+                overlapping.push(format!("patch {id} at faces {a} and {b}"));
+            }
+            Overlap::Undecided => overlapping.push(format!("patch {id} is too thin to be tested")),
+        }
+        bad += usize::from(m.flipped || m.dissimilar || !matches!(m.overlap, Overlap::None));
+    }
+    verdicts.note(
+        "patches keep flat lengths at their scale",
+        shape.0 < LENGTH_TOLERANCE,
+        format!("{:.3e} of the face's longest edge", shape.0),
+    );
+    verdicts.note(
+        "no two faces of a patch overlap",
+        overlapping.is_empty(),
+        overlapping[..overlapping.len().min(4)].join(", "),
+    );
+    verdicts.note(
+        "patches are similar to the central chart, positive, injective",
+        bad == 0,
+        format!("{bad} patches"),
+    );
+    let bound = options.log_scale_range.unwrap_or(f64::MAX);
+    verdicts.note(
+        "log scale range inside a patch is bounded",
+        range.0 <= bound * (1.0 + 1e-9),
+        format!("{:.4}", range.0),
+    );
+    Some(groups)
+}
+
+/// Connected and continuous across edges that are not cut.
+fn check_inside(
+    surface: &Surface<'_>,
+    arrays: &Arrays,
+    groups: &Groups,
+    options: &VerifyOptions,
+    verdicts: &mut Verdicts,
+) {
+    let cut = arrays.cut.as_flattened();
+    let patches = groups.start.len() - 1;
+    let diameter: Vec<f64> = (0..patches)
+        .map(|p| extent(arrays, groups.of(p)).diagonal())
+        .collect();
+    let mut sheets = UnionFind::new(arrays.faces.len());
+    let mut gap = Worst::default();
+    for (h, t) in surface.inner_edges() {
+        let (f, g) = (h / 3, t / 3);
+        if cut[h] != 0 || arrays.patch[f] != arrays.patch[g] {
+            continue;
+        }
+        sheets.join(f, g);
+        for (a, b) in [
+            (surface.tail_corner(h), surface.head_corner(t)),
+            (surface.head_corner(h), surface.tail_corner(t)),
+        ] {
+            let (a, b) = (
+                at_corner(&arrays.patch_uv, a),
+                at_corner(&arrays.patch_uv, b),
+            );
+            gap.see(distance2(a, b) / diameter[arrays.patch[f] as usize]);
+        }
+    }
+    let loose = (0..patches)
+        .filter(|p| {
+            let faces = groups.of(*p);
+            let first = faces.first().map(|f| sheets.find(*f as usize));
+            faces
+                .iter()
+                .any(|f| Some(sheets.find(*f as usize)) != first)
+        })
+        .count();
+    verdicts.note(
+        "every patch is connected off the cut",
+        loose == 0,
+        format!("{loose} patches in pieces"),
+    );
+    verdicts.note(
+        "patches are continuous inside",
+        gap.0 < options.tolerance,
+        format!("{:.3e} of the patch's diameter", gap.0),
+    );
+}
+
+pub(super) fn extent(arrays: &Arrays, faces: &[u32]) -> Extent2 {
+    Extent2::of(faces.iter().flat_map(|f| arrays.patch_uv[*f as usize]))
+}
+
+fn measure(arrays: &Arrays, patch: &Patch, faces: &[u32], slit: &Slit) -> Measured {
+    let extent = extent(arrays, faces);
+    let (diameter, reach) = (extent.diagonal(), extent.reach());
+    let uv = |f: u32| arrays.patch_uv[f as usize];
+    let mut shape = Worst::default();
+    let mut apart = Worst::default();
+    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+    for f in faces {
+        let flat = arrays.flat_length[*f as usize];
+        if let Some(map) = &patch.patch_to_chart {
+            let l = lengths2(uv(*f));
+            for k in 0..3 {
+                let error = (map.scale * l[k] - flat[k]).abs() - FLOOR * map.scale * diameter;
+                shape.see(error.max(0.0) / longest(flat));
+                let p = rotate(uv(*f)[k], map.rotation);
+                let q = std::array::from_fn(|i| map.scale * p[i] + map.translation[i]);
+                apart.see(distance2(q, arrays.central_uv[*f as usize][k]));
+            }
+            shape.see(if map.scale > 0.0 { 0.0 } else { f64::INFINITY });
+        }
+        let corners = arrays.triangle(*f as usize);
+        let well = |l: [f64; 3]| least_sine(corner_angles(l)) > 1e-5;
+        if well(flat) && well(lengths3(corners)) {
+            let scale = 0.5 * (area_from_lengths(flat) / area3(corners)).ln();
+            range = [range[0].min(scale), range[1].max(scale)];
+        }
+    }
+    let triangles: Vec<[Point2; 3]> = faces.iter().map(|f| uv(*f)).collect();
+    // `rectangle` patches are not similar to the chart.
+    let is_rectangle = patch.domain == "rectangle" && patch.patch_to_chart.is_none();
+    let lacks_map = patch.patch_to_chart.is_none() && !is_rectangle;
+    Measured {
+        shape: shape.0,
+        flipped: faces.iter().any(|f| !is_positive(uv(*f), reach)),
+        dissimilar: lacks_map || apart.0 > SIMILARITY_TOLERANCE * slit.diameter,
+        overlap: find_overlap(&triangles, OVERLAP_TOLERANCE * diameter),
+        log_scale_range: (range[1] - range[0]).max(0.0),
+    }
+}
+
+/// Two counterclockwise triangles that share more than `tolerance` (a length), if there are any.
+pub(super) fn find_overlap(triangles: &[[Point2; 3]], tolerance: f64) -> Overlap {
+    let limit = (256 * triangles.len() + 100_000).min(NONE as usize - 1);
+    // So many entries or pairs come from triangles that all lie on each other, or that all are long and
+    // thin: the first few tell the former.
+    let few = &triangles[..triangles.len().min(512)];
+    let Ok(grid) = Grid::new(triangles, tolerance, limit) else {
+        return find_overlap_directly(few, tolerance);
+    };
+    let pairs: u64 = (0..grid.cells())
+        .map(|cell| (grid.cell_items(cell).len() as u64).pow(2))
+        .sum();
+    if pairs > 5000 * triangles.len() as u64 + 10_000_000 {
+        return find_overlap_directly(few, tolerance);
+    }
+    let found = (0..grid.cells()).into_par_iter().find_map_first(|cell| {
+        let items = grid.cell_items(cell);
+        for (i, a) in items.iter().enumerate() {
+            for b in &items[i + 1..] {
+                let (a, b) = (*a as usize, *b as usize);
+                if overlap(&triangles[a], &triangles[b], tolerance) {
+                    return Some(Overlap::Pair(a, b));
+                }
+            }
+        }
+        None
+    });
+    found.unwrap_or(Overlap::None)
+}
+
+fn find_overlap_directly(triangles: &[[Point2; 3]], tolerance: f64) -> Overlap {
+    for (i, a) in triangles.iter().enumerate() {
+        for (j, b) in triangles.iter().enumerate().skip(i + 1) {
+            if overlap(a, b, tolerance) {
+                return Overlap::Pair(i, j);
+            }
+        }
+    }
+    Overlap::Undecided
+}
+
+/// Whether the interiors of two counterclockwise triangles meet by more than `tolerance`: no edge of either
+/// has the other triangle on its outer side.
+fn overlap(a: &[Point2; 3], b: &[Point2; 3], tolerance: f64) -> bool {
+    for i in 0..2 {
+        let low = |t: &[Point2; 3]| t[0][i].min(t[1][i]).min(t[2][i]);
+        let high = |t: &[Point2; 3]| t[0][i].max(t[1][i]).max(t[2][i]);
+        if high(a) - low(b) <= tolerance || high(b) - low(a) <= tolerance {
+            return false;
+        }
+    }
+    !(separates(a, b, tolerance) || separates(b, a, tolerance))
+}
+
+/// Whether an edge of `a` has `b` on its outer side.
+fn separates(a: &[Point2; 3], b: &[Point2; 3], tolerance: f64) -> bool {
+    (0..3).any(|k| {
+        let (p, q) = (a[k], a[(k + 1) % 3]);
+        let length = distance2(p, q);
+        length > 0.0
+            && b.iter().all(|r| {
+                let inward = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+                inward <= tolerance * length
+            })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbours_touch_but_do_not_overlap() {
+        let a = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+        let neighbour = [[1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let shifted = neighbour.map(|p| [p[0] - 0.01, p[1]]);
+        assert!(!overlap(&a, &neighbour, 1e-9));
+        assert!(overlap(&a, &shifted, 1e-9));
+        assert!(overlap(&a, &a, 1e-9));
+        assert!(overlap(&a, &[[0.1, 0.1], [0.2, 0.1], [0.1, 0.2]], 1e-9));
+    }
+
+    #[test]
+    fn overlaps_agree_with_testing_every_pair() {
+        // A strip that winds around and comes back over its own beginning, or stops before.
+        for (steps, expected) in [(20u32, false), (30, true)] {
+            let uv: Vec<[Point2; 3]> = (0..steps)
+                .flat_map(|i| {
+                    let at = |i: u32, r: f64| {
+                        let (s, c) = (f64::from(i) * 0.25).sin_cos();
+                        [r * c, r * s]
+                    };
+                    let (a, b) = (at(i, 1.0), at(i, 2.0));
+                    let (c, d) = (at(i + 1, 2.0), at(i + 1, 1.0));
+                    [[a, b, c], [a, c, d]]
+                })
+                .collect();
+            let found = matches!(find_overlap(&uv, 4e-9), Overlap::Pair(..));
+            let brute = uv
+                .iter()
+                .enumerate()
+                .any(|(i, a)| uv[i + 1..].iter().any(|b| overlap(a, b, 4e-9)));
+            assert_eq!((found, brute), (expected, expected));
+        }
+    }
+
+    #[test]
+    fn a_heap_of_the_same_face_is_found_in_bounded_work() {
+        let heap = vec![[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]; 50_000];
+        assert!(matches!(find_overlap(&heap, 1e-9), Overlap::Pair(..)));
+    }
+}
