@@ -1,0 +1,181 @@
+//! Arguments and their help texts.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+const EXIT_CODES: &str = "\
+Exit codes:
+    0  all good
+    1  some meshes (or checks) failed
+    2  wrong arguments or configuration
+    3  nothing to do
+    4  an error of this program
+  130  stopped by Ctrl-C";
+
+/// Turns triangle meshes into affine atlases.
+///
+/// An affine atlas covers the surface with flat charts whose transitions are rotations and
+/// translations. It is computed by discrete Ricci flow and written as NumPy arrays, geometry
+/// images (EXR) and a textured GLB.
+#[derive(Debug, Parser)]
+#[command(name = "affine-atlas", version, after_help = EXIT_CODES, after_long_help = EXIT_CODES)]
+pub struct Arguments {
+    #[command(subcommand)]
+    pub command: Command,
+    #[command(flatten)]
+    pub global: Global,
+}
+
+/// Options of every command.
+#[derive(Clone, Debug, Default, Args)]
+pub struct Global {
+    /// Show errors only
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Show each step; twice: everything
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    pub verbose: u8,
+    /// Progress and errors as text, or as one JSON object a line (both on standard error)
+    #[arg(
+        long,
+        global = true,
+        value_enum,
+        value_name = "FORMAT",
+        default_value_t
+    )]
+    pub log_format: LogFormat,
+    /// Threads to use; 0 takes one for each core [default: run.threads of the configuration]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
+    pub threads: Option<u16>,
+}
+
+/// How progress and errors are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum LogFormat {
+    /// For people.
+    #[default]
+    Text,
+    /// For programs.
+    Json,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Build an atlas of each mesh
+    #[command(after_help = BUILD_EXAMPLES, after_long_help = BUILD_EXAMPLES)]
+    Build(Build),
+    /// Say what a build would do, and build nothing
+    #[command(after_help = CHECK_EXAMPLES, after_long_help = CHECK_EXAMPLES)]
+    Check(Check),
+    /// Read atlases back and check every property they must have
+    #[command(after_help = VERIFY_EXAMPLES, after_long_help = VERIFY_EXAMPLES)]
+    Verify(Verify),
+    /// Write a configuration file that explains every key
+    #[command(after_help = INIT_EXAMPLES, after_long_help = INIT_EXAMPLES)]
+    Init(Init),
+}
+
+const BUILD_EXAMPLES: &str = "\
+Examples:
+  affine-atlas build                              what ./config.toml says
+  affine-atlas build bunny.obj --out atlases      one mesh, default settings
+  affine-atlas build bunny.obj --set cones.strategy=spread --set cones.count=6
+  affine-atlas build my.toml bunny.obj            settings of my.toml, another mesh
+
+Each mesh becomes a folder OUT/NAME with atlas.json, atlas.npz, surface.glb, images/ and pictures.
+It appears when it is complete; an older good folder stays if the build fails.";
+
+const CHECK_EXAMPLES: &str = "\
+Examples:
+  affine-atlas check                  what ./config.toml says
+  affine-atlas check scan.ply         one mesh, default settings
+
+Shows for each mesh: components, vertices, faces, genus, boundary loops, the total curvature its
+cones must have, and what would be repaired.";
+
+const VERIFY_EXAMPLES: &str = "\
+Examples:
+  affine-atlas verify affine-atlas-out/bunny
+  affine-atlas verify affine-atlas-out/bunny --source bunny.obj --cones 8 --json
+
+Uses nothing but the files in the folder. Exit code 0 if every check passed, 1 if not.";
+
+const INIT_EXAMPLES: &str = "\
+Examples:
+  affine-atlas init                   writes ./config.toml
+  affine-atlas init settings/my.toml";
+
+/// Meshes and settings.
+#[derive(Debug, Args)]
+pub struct Inputs {
+    /// A configuration (ends in .toml), meshes (glTF, GLB, OBJ, PLY, STL, OFF), or both: meshes
+    /// then take the place of `input.paths` [default: config.toml]
+    #[arg(value_name = "CONFIG|MESH")]
+    pub inputs: Vec<PathBuf>,
+    /// Set a key of the configuration, for example `flow.scheme=thurston`; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct Build {
+    #[command(flatten)]
+    pub inputs: Inputs,
+    /// Folder for the atlases [default: output.folder of the configuration, or affine-atlas-out]
+    #[arg(short, long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct Check {
+    #[command(flatten)]
+    pub inputs: Inputs,
+}
+
+#[derive(Debug, Args)]
+pub struct Verify {
+    /// Folders that `build` wrote: of one mesh, or of many
+    #[arg(value_name = "DIR", required = true)]
+    pub folders: Vec<PathBuf>,
+    /// Write one JSON array instead of text
+    #[arg(long)]
+    pub json: bool,
+    /// Compare with the mesh the atlas was made from
+    #[arg(long, value_name = "MESH")]
+    pub source: Option<PathBuf>,
+    /// Require this number of cones in each component
+    #[arg(long, value_name = "N")]
+    pub cones: Option<usize>,
+}
+
+#[derive(Debug, Args)]
+pub struct Init {
+    /// File to write, or folder to write config.toml into
+    #[arg(value_name = "PATH", default_value = "config.toml")]
+    pub path: PathBuf,
+    /// Replace an existing file
+    #[arg(long)]
+    pub force: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn definition_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn global_options_stand_anywhere() {
+        for line in [
+            ["affine-atlas", "--threads", "3", "build"],
+            ["affine-atlas", "build", "--threads", "3"],
+        ] {
+            let arguments = Arguments::try_parse_from(line).expect("parses");
+            assert_eq!(arguments.global.threads, Some(3));
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! The command line: reads arguments, shows progress, words results. Computes nothing.
+
+mod arguments;
+mod build;
+mod check;
+mod init;
+mod interrupt;
+mod log;
+mod panics;
+mod plan;
+mod problem;
+mod progress;
+mod summary;
+mod terminal;
+mod verify;
+pub mod work;
+
+use arguments::{Arguments, Command};
+use clap::Parser;
+use problem::Problem;
+use std::process::ExitCode;
+use work::Work;
+
+/// Exit codes of the output contract.
+mod exit {
+    /// All good.
+    pub const GOOD: u8 = 0;
+    /// Some assets failed, or some checks did.
+    pub const SOME_FAILED: u8 = 1;
+    /// Bad usage or configuration.
+    pub const USAGE: u8 = 2;
+    /// Nothing to do where something was asked for.
+    pub const NOTHING_TO_DO: u8 = 3;
+    /// An error of this program.
+    pub const INTERNAL: u8 = 4;
+    /// Stopped by Ctrl-C, as shells number it: 128 + SIGINT.
+    pub const INTERRUPTED: u8 = 130;
+}
+
+/// Runs the command and gives its exit code; never panics.
+pub fn main(work: &Work) -> ExitCode {
+    terminal::decide_colours();
+    // Wrong arguments end here with exit code 2, `--help` and `--version` with 0.
+    let arguments = Arguments::parse();
+    log::start(&arguments.global);
+    panics::keep_quiet();
+    let code = match panics::catch(|| run(&arguments, work)) {
+        Ok(Ok(code)) => code,
+        Ok(Err(problem)) => {
+            problem.show(arguments.global.log_format);
+            problem.exit_code()
+        }
+        Err(panic) => {
+            Problem::Internal(panic).show(arguments.global.log_format);
+            exit::INTERNAL
+        }
+    };
+    interrupt::finish();
+    ExitCode::from(code)
+}
+
+fn run(arguments: &Arguments, work: &Work) -> Result<u8, Problem> {
+    let global = &arguments.global;
+    match &arguments.command {
+        Command::Build(build) => build::run(build, global, work),
+        Command::Check(check) => check::run(check, global, work),
+        Command::Verify(verify) => verify::run(verify, global, work),
+        Command::Init(init) => init::run(init, global),
+    }
+}

@@ -1,0 +1,180 @@
+//! From arguments to what is to be done: the configuration and the named assets.
+
+use super::arguments::Inputs;
+use super::problem::Problem;
+use affine_atlas::config::assets::{Asset, name_assets};
+use affine_atlas::config::{self, Config, Loaded};
+use std::path::{Path, PathBuf};
+
+/// What is to be done.
+#[derive(Debug)]
+pub struct Plan {
+    /// The effective configuration.
+    pub config: Config,
+    /// The output folder, relative to the current folder or absolute.
+    pub output: PathBuf,
+    /// At least one.
+    pub assets: Vec<Asset>,
+}
+
+/// Reads the configuration and names the assets.
+///
+/// Positional arguments that end in `.toml` are a configuration, all others are meshes and take
+/// the place of `input.paths`. Meshes without a configuration use the defaults; `config.toml` is
+/// read only where nothing is named at all.
+pub fn plan(inputs: &Inputs, out: Option<&Path>) -> Result<Plan, Problem> {
+    let (configs, meshes): (Vec<&PathBuf>, Vec<&PathBuf>) =
+        inputs.inputs.iter().partition(|path| is_config(path));
+    let default = PathBuf::from("config.toml");
+    let file = match configs[..] {
+        [] if meshes.is_empty() => Some(&default),
+        [] => None,
+        [only] => Some(only),
+        [first, second, ..] => {
+            return Err(Problem::TwoConfigs {
+                first: first.clone(),
+                second: second.clone(),
+            });
+        }
+    };
+    let mut loaded = match file {
+        Some(file) => config::load(file, &inputs.set)?,
+        None => Loaded {
+            config: config::parse("defaults", "", &inputs.set)?,
+            input_base: PathBuf::new(),
+            output_base: PathBuf::new(),
+        },
+    };
+    if !meshes.is_empty() {
+        loaded.config.input.paths = meshes.into_iter().cloned().collect();
+        loaded.input_base = PathBuf::new();
+    }
+    if let Some(out) = out {
+        loaded.config.output.folder = out.to_owned();
+        loaded.output_base = PathBuf::new();
+    }
+    if loaded.config.input.paths.is_empty() {
+        return Err(Problem::NoInputs);
+    }
+    let output = loaded.output_folder();
+    let assets = name_assets(&loaded.config.input.paths, &loaded.input_base);
+    Ok(Plan {
+        config: loaded.config,
+        output,
+        assets,
+    })
+}
+
+fn is_config(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+}
+
+impl Plan {
+    /// The folder that is written for an asset.
+    pub fn folder(&self, asset: &Asset) -> PathBuf {
+        self.output.join(&asset.id)
+    }
+
+    /// Refuses a plan in which an asset's folder, which is replaced as a whole, holds an input:
+    /// `build spot/spot.obj --out .` must not delete `spot/spot.obj`.
+    pub fn keep_inputs(&self) -> Result<(), Problem> {
+        for folder in self.assets.iter().map(|asset| self.folder(asset)) {
+            let Ok(real) = folder.canonicalize() else {
+                continue; // Does not exist, so nothing is in it.
+            };
+            for input in self.assets.iter().map(|asset| &asset.path) {
+                if input
+                    .canonicalize()
+                    .is_ok_and(|input| input.starts_with(&real))
+                {
+                    return Err(Problem::OverwritesInput {
+                        folder,
+                        input: input.clone(),
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Sets up the threads of this run: the option, else the configuration, else one for each core.
+pub fn start_threads(option: Option<u16>, config: &Config) -> Result<(), Problem> {
+    let given = option.map_or(config.run.threads, usize::from);
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(given)
+        .build_global()
+        .map_err(|error| Problem::Threads {
+            given,
+            reason: error.to_string(),
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn inputs(names: &[&Path], set: &[&str]) -> Inputs {
+        Inputs {
+            inputs: names.iter().map(|name| name.to_path_buf()).collect(),
+            set: set.iter().map(|&text| text.to_owned()).collect(),
+        }
+    }
+
+    #[test]
+    fn meshes_use_the_defaults_and_start_at_the_current_folder() {
+        let plan = plan(&inputs(&[Path::new("m/a.obj")], &[]), None).expect("planned");
+        assert_eq!(plan.assets[0].path, Path::new("m/a.obj"));
+        assert_eq!(plan.output, Path::new("affine-atlas-out"));
+        assert_eq!(
+            plan.folder(&plan.assets[0]),
+            Path::new("affine-atlas-out/a")
+        );
+    }
+
+    #[test]
+    fn meshes_beside_a_configuration_replace_its_paths() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let file = folder.path().join("my.TOML");
+        std::fs::write(
+            &file,
+            "[input]\npaths = [\"x.obj\"]\n[patches]\npadding = 7",
+        )
+        .expect("written");
+        let own = plan(&inputs(&[&file], &[]), Some(Path::new("out"))).expect("planned");
+        assert_eq!(own.assets[0].path, folder.path().join("x.obj"));
+        assert_eq!(own.output, Path::new("out"));
+        let other = plan(&inputs(&[Path::new("y.obj"), &file], &[]), None).expect("planned");
+        assert_eq!(other.assets[0].path, Path::new("y.obj"));
+        assert_eq!(other.output, folder.path().join("affine-atlas-out"));
+        assert_eq!(other.config.patches.padding, 7);
+    }
+
+    #[test]
+    fn two_configurations_and_no_mesh_are_refused() {
+        let two = plan(
+            &inputs(&[Path::new("a.toml"), Path::new("b.toml")], &[]),
+            None,
+        );
+        assert!(matches!(two, Err(Problem::TwoConfigs { .. })));
+        let none = plan(&inputs(&[Path::new("a.obj")], &["flow.scheme"]), None);
+        assert!(matches!(none, Err(Problem::Config(_))));
+    }
+
+    #[test]
+    fn an_input_inside_its_own_output_is_refused() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let inner = folder.path().join("spot");
+        std::fs::create_dir(&inner).expect("created");
+        let mesh = inner.join("spot.obj");
+        std::fs::write(&mesh, "").expect("written");
+        let inside = plan(&inputs(&[&mesh], &[]), Some(folder.path())).expect("planned");
+        assert!(matches!(
+            inside.keep_inputs(),
+            Err(Problem::OverwritesInput { .. })
+        ));
+        let beside = plan(&inputs(&[&mesh], &[]), Some(&inner)).expect("planned");
+        beside.keep_inputs().expect("spot/spot does not exist");
+    }
+}

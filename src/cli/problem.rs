@@ -1,0 +1,174 @@
+//! Why the command itself (not one asset) cannot go on, and how that is shown.
+
+use super::arguments::LogFormat;
+use super::{exit, terminal};
+use affine_atlas::config::ConfigError;
+use miette::{
+    Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource, SourceCode,
+    ThemeCharacters, ThemeStyles,
+};
+use std::fmt;
+use std::path::PathBuf;
+
+/// Why the command cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum Problem {
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    #[error("two configurations are named, {} and {}", first.display(), second.display())]
+    TwoConfigs { first: PathBuf, second: PathBuf },
+    #[error("no mesh is named: `input.paths` is empty")]
+    NoInputs,
+    #[error(
+        "the output folder {} of this run would replace the folder of its input {}",
+        folder.display(), input.display()
+    )]
+    OverwritesInput { folder: PathBuf, input: PathBuf },
+    #[error("{} exists already", path.display())]
+    Exists { path: PathBuf },
+    #[error("{} cannot be written: {reason}", path.display())]
+    NotWritten { path: PathBuf, reason: String },
+    #[error("{} cannot be written: {reason}", path.display())]
+    NotRecorded { path: PathBuf, reason: String },
+    #[error("there is no folder {}", path.display())]
+    NoFolder { path: PathBuf },
+    #[error("the {given} threads of this run cannot be started: {reason}")]
+    Threads { given: usize, reason: String },
+    #[error("{0}")]
+    Internal(String),
+}
+
+impl Problem {
+    /// Exit code of the output contract.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::NoInputs => exit::NOTHING_TO_DO,
+            Self::NotRecorded { .. } => exit::SOME_FAILED,
+            Self::Internal(_) => exit::INTERNAL,
+            _ => exit::USAGE,
+        }
+    }
+
+    fn remedy(&self) -> Option<String> {
+        let text = match self {
+            Self::Config(error) => return Some(error.remedy()),
+            Self::TwoConfigs { .. } => {
+                "name one; single keys can be changed with `--set key=value`"
+            }
+            Self::NoInputs => {
+                "name a mesh: `affine-atlas build MESH`, or list meshes in `input.paths`"
+            }
+            Self::OverwritesInput { .. } => "choose another folder with `--out`",
+            Self::Exists { .. } => "choose another name, or replace it with `--force`",
+            Self::NotWritten { .. } | Self::NotRecorded { .. } => {
+                "check that its folder exists, may be written and has space left"
+            }
+            Self::NoFolder { .. } => "name a folder that `affine-atlas build` wrote",
+            Self::Threads { .. } => "ask for fewer with `--threads`",
+            Self::Internal(_) => return None,
+        };
+        Some(text.to_owned())
+    }
+
+    /// Writes it on standard error.
+    pub fn show(&self, format: LogFormat) {
+        match format {
+            LogFormat::Text => terminal::print_error(&self.render()),
+            LogFormat::Json => tracing::error!(
+                target: "affine_atlas",
+                exit_code = self.exit_code(),
+                remedy = self.remedy(),
+                "{self}"
+            ),
+        }
+    }
+
+    /// As text with the offending line, coloured where standard error is a terminal with colours.
+    fn render(&self) -> String {
+        let terminal = terminal::stderr_is_terminal();
+        let mut characters = if terminal {
+            ThemeCharacters::unicode()
+        } else {
+            ThemeCharacters::ascii()
+        };
+        characters.error = "error:".to_owned();
+        characters.underline = '^';
+        let theme = GraphicalTheme {
+            characters,
+            styles: if console::colors_enabled_stderr() {
+                ThemeStyles::ansi()
+            } else {
+                ThemeStyles::none()
+            },
+        };
+        let handler = GraphicalReportHandler::new_themed(theme)
+            .with_width(terminal::stderr_width())
+            .with_context_lines(1)
+            .with_links(false);
+        let mut text = String::new();
+        match handler.render_report(&mut text, &Shown::new(self)) {
+            Ok(()) => text,
+            // The plain sentence, should a text defeat the layout.
+            Err(_) => format!("error: {self}\n"),
+        }
+    }
+}
+
+/// A [`Problem`] in the shape that miette lays out.
+#[derive(Debug)]
+struct Shown {
+    message: String,
+    remedy: Option<String>,
+    source: Option<NamedSource<String>>,
+    label: Option<LabeledSpan>,
+}
+
+impl Shown {
+    fn new(problem: &Problem) -> Self {
+        let location = match problem {
+            Problem::Config(error) => error.location(),
+            _ => None,
+        };
+        let sentence = problem.to_string();
+        let message = match location {
+            // The frame around the excerpt states the place.
+            Some(at) => match sentence.strip_prefix(&format!("{at}: ")) {
+                Some(rest) => rest.to_owned(),
+                None => sentence,
+            },
+            None => sentence,
+        };
+        Self {
+            message,
+            remedy: problem.remedy(),
+            source: location.map(|at| NamedSource::new(&at.name, at.text.to_string())),
+            label: location.map(|at| LabeledSpan::new(None, at.span.start, at.offending().len())),
+        }
+    }
+}
+
+impl fmt::Display for Shown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Shown {}
+
+impl Diagnostic for Shown {
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        self.remedy
+            .as_ref()
+            .map(|remedy| Box::new(remedy) as Box<dyn fmt::Display>)
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        self.source.as_ref().map(|source| source as &dyn SourceCode)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        self.label
+            .clone()
+            .map(|label| Box::new(std::iter::once(label)) as Box<dyn Iterator<Item = LabeledSpan>>)
+    }
+}

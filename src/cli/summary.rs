@@ -1,0 +1,330 @@
+//! What became of every asset, in one line each.
+
+use affine_atlas::outcome::{AssetOutcome, Summary};
+use console::{measure_text_width, style, truncate_str};
+
+/// Columns, and the order in which they are left out where the terminal is narrow.
+const COLUMNS: [&str; 9] = [
+    "mesh",
+    "state",
+    "vertices",
+    "faces",
+    "genus",
+    "cones",
+    "max error",
+    "area distortion",
+    "seconds",
+];
+const LEAVE_OUT: [usize; 6] = [8, 4, 5, 7, 2, 3];
+/// Columns that hold words; the others hold figures and are set flush right.
+const WORDS: usize = 2;
+const FOLDER: &str = "folder";
+
+struct Row {
+    cells: [String; 9],
+    folder: String,
+    state: &'static str,
+}
+
+/// A table of all assets, one line each; a line a component below assets that have several.
+/// `width` is that of the terminal, none where lines may be as long as they need.
+pub fn table(outcomes: &[AssetOutcome], width: Option<usize>) -> String {
+    let rows: Vec<Row> = outcomes.iter().flat_map(rows).collect();
+    let widths: Vec<usize> = (0..COLUMNS.len())
+        .map(|column| {
+            let cells = rows
+                .iter()
+                .map(|row| measure_text_width(&row.cells[column]));
+            cells.max().unwrap_or(0).max(COLUMNS[column].len())
+        })
+        .collect();
+    let folder = rows
+        .iter()
+        .map(|row| measure_text_width(&row.folder))
+        .max()
+        .unwrap_or(0);
+    let mut shown: Vec<usize> = (0..COLUMNS.len()).collect();
+    let mut with_folder = true;
+    if let Some(limit) = width {
+        let length = |shown: &[usize]| {
+            shown
+                .iter()
+                .map(|&column| widths[column] + 2)
+                .sum::<usize>()
+        };
+        with_folder = length(&shown) + folder <= limit;
+        for column in LEAVE_OUT {
+            if length(&shown) > limit + 2 {
+                shown.retain(|&other| other != column);
+            }
+        }
+    }
+    let mut text = String::new();
+    let heading: Vec<String> = shown
+        .iter()
+        .map(|&column| pad(COLUMNS[column], widths[column], column))
+        .collect();
+    push_line(
+        &mut text,
+        heading.join("  "),
+        with_folder.then_some(FOLDER),
+        width,
+    );
+    for row in &rows {
+        let cells: Vec<String> = shown
+            .iter()
+            .map(|&column| {
+                let cell = pad(&row.cells[column], widths[column], column);
+                match (column, row.state) {
+                    (1, "built") => style(cell).green().to_string(),
+                    (1, "failed") => style(cell).red().to_string(),
+                    (1, _) => style(cell).yellow().to_string(),
+                    _ => cell,
+                }
+            })
+            .collect();
+        push_line(
+            &mut text,
+            cells.join("  "),
+            with_folder.then_some(&row.folder),
+            width,
+        );
+    }
+    text
+}
+
+fn pad(cell: &str, width: usize, column: usize) -> String {
+    let space = " ".repeat(width.saturating_sub(measure_text_width(cell)));
+    if column < WORDS {
+        format!("{cell}{space}")
+    } else {
+        format!("{space}{cell}")
+    }
+}
+
+fn push_line(text: &mut String, mut line: String, folder: Option<&str>, width: Option<usize>) {
+    if let Some(folder) = folder {
+        line.push_str("  ");
+        line.push_str(folder);
+    }
+    let line = line.trim_end();
+    match width {
+        Some(width) => text.push_str(&truncate_str(line, width, "…")),
+        None => text.push_str(line),
+    }
+    text.push('\n');
+}
+
+fn rows(outcome: &AssetOutcome) -> Vec<Row> {
+    let seconds = format!("{:.1}", outcome.seconds);
+    let state = outcome.state_name();
+    match &outcome.components[..] {
+        [only] => {
+            let figures = only.result.as_ref().ok();
+            vec![row(
+                outcome.id.clone(),
+                state.to_owned(),
+                state,
+                figures,
+                seconds,
+            )]
+        }
+        [] => vec![row(
+            outcome.id.clone(),
+            state.to_owned(),
+            state,
+            None,
+            seconds,
+        )],
+        several => {
+            let built = several
+                .iter()
+                .filter(|component| component.result.is_ok())
+                .count();
+            let words = match state {
+                "failed" => format!("{built} of {} built", several.len()),
+                state => state.to_owned(),
+            };
+            let mut rows = vec![row(outcome.id.clone(), words, state, None, seconds)];
+            for component in several {
+                let state = if component.result.is_ok() {
+                    "built"
+                } else {
+                    "failed"
+                };
+                rows.push(row(
+                    format!("  component {}", component.index),
+                    state.to_owned(),
+                    state,
+                    component.result.as_ref().ok(),
+                    String::new(),
+                ));
+            }
+            rows
+        }
+    }
+}
+
+fn row(
+    mesh: String,
+    words: String,
+    state: &'static str,
+    figures: Option<&Summary>,
+    seconds: String,
+) -> Row {
+    let figure = |of: &dyn Fn(&Summary) -> String| figures.map(of).unwrap_or_default();
+    Row {
+        cells: [
+            mesh,
+            words,
+            figure(&|f| f.vertices.to_string()),
+            figure(&|f| f.faces.to_string()),
+            figure(&|f| f.genus.to_string()),
+            figure(&|f| f.cones.to_string()),
+            figure(&|f| format!("{:.1e}", f.max_curvature_error)),
+            figure(&|f| format!("{:.4}", f.area_distortion)),
+            seconds,
+        ],
+        folder: figure(&|f| f.folder.display().to_string()),
+        state,
+    }
+}
+
+/// Every failure in one line, for standard error; empty where there is none.
+pub fn failures(outcomes: &[AssetOutcome]) -> String {
+    let mut text = String::new();
+    for outcome in outcomes {
+        for (component, failure) in outcome.failures() {
+            let place = match component {
+                Some(index) if outcome.components.len() > 1 => {
+                    format!("{}, component {index}", outcome.id)
+                }
+                _ => outcome.id.clone(),
+            };
+            let label = style("failed").red().for_stderr();
+            text.push_str(&format!(
+                "{label}: {place} ({}): {}\n",
+                failure.kind.name(),
+                failure.message
+            ));
+        }
+    }
+    text
+}
+
+/// Figures and failures of an asset as structured log lines; with `--quiet` failures only.
+pub fn log(outcome: &AssetOutcome) {
+    for component in &outcome.components {
+        if let Ok(figures) = &component.result {
+            tracing::info!(
+                target: "affine_atlas",
+                asset = outcome.id,
+                component = component.index,
+                vertices = figures.vertices,
+                faces = figures.faces,
+                genus = figures.genus,
+                boundary_loops = figures.boundary_loops,
+                cones = figures.cones,
+                max_curvature_error = figures.max_curvature_error,
+                area_distortion = figures.area_distortion,
+                folder = %figures.folder.display(),
+                "component built"
+            );
+        }
+    }
+    for (component, failure) in outcome.failures() {
+        tracing::error!(
+            target: "affine_atlas",
+            asset = outcome.id,
+            component,
+            kind = failure.kind.name(),
+            "{}",
+            failure.message
+        );
+    }
+    tracing::info!(
+        target: "affine_atlas",
+        asset = outcome.id,
+        state = outcome.state_name(),
+        seconds = outcome.seconds,
+        "asset finished"
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use affine_atlas::outcome::{AssetState, ComponentOutcome, Failure, FailureKind};
+
+    fn sample() -> Vec<AssetOutcome> {
+        // Also where the tests run on a terminal.
+        console::set_colors_enabled(false);
+        console::set_colors_enabled_stderr(false);
+        let figures = Summary {
+            vertices: 2930,
+            faces: 5856,
+            genus: 0,
+            boundary_loops: 0,
+            cones: 8,
+            max_curvature_error: 3.14e-13,
+            area_distortion: 1.23456,
+            folder: "out/spot".into(),
+        };
+        let failure = Failure {
+            kind: FailureKind::Prescription,
+            message: "the sum is 3 and must be 4; add a cone".to_owned(),
+        };
+        let component = |index, result| ComponentOutcome { index, result };
+        vec![
+            AssetOutcome {
+                components: vec![component(0, Ok(figures.clone()))],
+                ..AssetOutcome::whole("spot", AssetState::Built, 0.94)
+            },
+            AssetOutcome {
+                components: vec![
+                    component(0, Ok(figures)),
+                    component(1, Err(failure.clone())),
+                ],
+                ..AssetOutcome::whole("truck", AssetState::Built, 12.0)
+            },
+            AssetOutcome::failed("möbius", failure, 0.1),
+        ]
+    }
+
+    #[test]
+    fn wide_table() {
+        insta::assert_snapshot!(table(&sample(), None), @r"
+        mesh           state         vertices  faces  genus  cones  max error  area distortion  seconds  folder
+        spot           built             2930   5856      0      8    3.1e-13           1.2346      0.9  out/spot
+        truck          1 of 2 built                                                                12.0
+          component 0  built             2930   5856      0      8    3.1e-13           1.2346           out/spot
+          component 1  failed
+        möbius         failed                                                                       0.1
+        ");
+    }
+
+    #[test]
+    fn narrow_tables_fit() {
+        for width in 20..140 {
+            for line in table(&sample(), Some(width)).lines() {
+                assert!(measure_text_width(line) <= width, "{width}: {line}");
+            }
+        }
+        insta::assert_snapshot!(table(&sample(), Some(60)), @r"
+        mesh           state         vertices  faces  max error
+        spot           built             2930   5856    3.1e-13
+        truck          1 of 2 built
+          component 0  built             2930   5856    3.1e-13
+          component 1  failed
+        möbius         failed
+        ");
+    }
+
+    #[test]
+    fn failures_in_one_line_each() {
+        insta::assert_snapshot!(failures(&sample()), @r"
+        failed: truck, component 1 (prescription): the sum is 3 and must be 4; add a cone
+        failed: möbius (prescription): the sum is 3 and must be 4; add a cone
+        ");
+    }
+}

@@ -1,0 +1,49 @@
+//! What the command line asks of the library.
+
+use affine_atlas::config::Config;
+use affine_atlas::config::assets::Asset;
+use affine_atlas::observe::Observer;
+use affine_atlas::outcome::{AssetOutcome, Failure};
+use std::path::{Path, PathBuf};
+
+/// Functions of the library that the commands call. Tests put their own in.
+pub struct Work {
+    /// Builds one asset into its folder below the output folder given.
+    pub build: fn(&Asset, &Path, &Config, &dyn Observer) -> AssetOutcome,
+    /// Writes what became of all assets into the output folder (the manifest).
+    pub record: fn(&Path, &Config, &[AssetOutcome]) -> Result<(), Failure>,
+    /// Says what a build would do, without building.
+    pub inspect: fn(&Asset, &Config) -> Result<Inspection, Failure>,
+    /// Reads an output folder back and checks it.
+    pub verify: fn(&VerifyRequest) -> Result<VerifyResult, Failure>,
+    /// Removes folders that are being written. Called once before the program is stopped.
+    pub remove_staging: fn(),
+}
+
+/// What `check` says of one asset.
+pub struct Inspection {
+    /// Topology, Gauss–Bonnet budget, what would be repaired: lines for a reader.
+    pub text: String,
+    /// Whether a build would be refused for what is known already.
+    pub refused: bool,
+}
+
+/// What `verify` is asked for one folder.
+pub struct VerifyRequest {
+    /// An asset's folder, or a folder of assets.
+    pub folder: PathBuf,
+    /// The mesh it was made from.
+    pub source: Option<PathBuf>,
+    /// How many cones there must be.
+    pub cones: Option<usize>,
+}
+
+/// What `verify` found.
+pub struct VerifyResult {
+    /// A line a check and the totals.
+    pub text: String,
+    /// The same for programs.
+    pub json: serde_json::Value,
+    /// Checks that failed.
+    pub failed: usize,
+}

@@ -1,0 +1,220 @@
+//! Checks a parsed text against [`KEYS`](super::keys::KEYS), where spans are still known.
+
+use super::error::{ConfigError, Location};
+use super::keys::{self, Kind};
+use std::ops::Range;
+use std::sync::Arc;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// A configuration text and what to call it.
+pub(super) struct Source {
+    /// The file as given, or `--set`.
+    pub name: String,
+    /// The text.
+    pub text: Arc<str>,
+}
+
+impl Source {
+    pub fn at(&self, span: Range<usize>) -> Box<Location> {
+        Box::new(Location::new(&self.name, &self.text, span))
+    }
+}
+
+/// Refuses the first key or value of the text that [`KEYS`](super::keys::KEYS) does not allow.
+pub(super) fn check(source: &Source, table: &DeTable<'_>) -> Result<(), ConfigError> {
+    let mut errors = Vec::new();
+    check_table(source, table, "", &mut errors);
+    // Tables are sorted by key; a reader fixes a file from the top.
+    let first = errors
+        .into_iter()
+        .min_by_key(|error| error.location().map_or(0, |at| at.span.start));
+    first.map_or(Ok(()), Err)
+}
+
+fn check_table(source: &Source, table: &DeTable<'_>, prefix: &str, errors: &mut Vec<ConfigError>) {
+    for (name, value) in table {
+        let path = match prefix {
+            "" => name.get_ref().to_string(),
+            prefix => format!("{prefix}.{}", name.get_ref()),
+        };
+        if let Some(key) = keys::find(&path) {
+            check_value(source, &path, key.kind, value, errors);
+        } else if keys::is_section(&path) {
+            match value.get_ref() {
+                DeValue::Table(inner) => check_table(source, inner, &path, errors),
+                other => errors.push(ConfigError::WrongType {
+                    at: source.at(value.span()),
+                    expected: format!("keys of its own, written below a line [{path}]"),
+                    got: describe(other),
+                    key: path,
+                }),
+            }
+        } else {
+            errors.push(unknown_key(source, name.span(), path, value.get_ref()));
+        }
+    }
+}
+
+fn unknown_key(
+    source: &Source,
+    span: Range<usize>,
+    path: String,
+    value: &DeValue<'_>,
+) -> ConfigError {
+    let section = !path.contains('.') && matches!(value, DeValue::Table(_));
+    let known = match path.rsplit_once('.') {
+        Some((parent, _)) if keys::is_section(parent) => {
+            keys::members(parent).map(|key| key.path).collect()
+        }
+        _ => keys::sections(),
+    };
+    ConfigError::UnknownKey {
+        at: source.at(span),
+        nearest: keys::nearest(&path),
+        section,
+        known,
+        key: path,
+    }
+}
+
+fn check_value(
+    source: &Source,
+    path: &str,
+    kind: Kind,
+    value: &Spanned<DeValue<'_>>,
+    errors: &mut Vec<ConfigError>,
+) {
+    let wrong_type = |value: &Spanned<DeValue<'_>>, kind: Kind| ConfigError::WrongType {
+        at: source.at(value.span()),
+        key: path.to_owned(),
+        expected: kind.to_string(),
+        got: describe(value.get_ref()),
+    };
+    let out_of_range = |given: &str| ConfigError::OutOfRange {
+        at: source.at(value.span()),
+        key: path.to_owned(),
+        given: given.to_owned(),
+        allowed: kind.to_string(),
+    };
+    match (kind, value.get_ref()) {
+        (Kind::Bool, DeValue::Boolean(_))
+        | (Kind::Text, DeValue::String(_))
+        | (Kind::Curvature, DeValue::String(_)) => {}
+        (Kind::Integer { min, max }, DeValue::Integer(given)) => {
+            let number = i64::from_str_radix(given.as_str(), given.radix());
+            if !number.is_ok_and(|number| (min..=max).contains(&number)) {
+                errors.push(out_of_range(given.as_str()));
+            }
+        }
+        (
+            Kind::Number { .. } | Kind::ZeroOr { .. } | Kind::Curvature,
+            given @ (DeValue::Integer(_) | DeValue::Float(_)),
+        ) => {
+            // NaN and infinities are in no range.
+            let (allowed, words) = match (kind, number(given)) {
+                (Kind::Number { min, max }, Some(x)) => (min <= x && x <= max, kind.to_string()),
+                (Kind::ZeroOr { min, max }, Some(x)) => {
+                    (x == 0.0 || (min <= x && x <= max), kind.to_string())
+                }
+                // Any multiple of π; the stage compares it with Gauss–Bonnet.
+                (_, x) => (x.is_some_and(f64::is_finite), "a finite number".to_owned()),
+            };
+            if !allowed {
+                errors.push(ConfigError::OutOfRange {
+                    at: source.at(value.span()),
+                    key: path.to_owned(),
+                    given: raw(given).to_owned(),
+                    allowed: words,
+                });
+            }
+        }
+        (Kind::Choice(words), DeValue::String(given)) => {
+            if !words.contains(&given.as_ref()) {
+                errors.push(ConfigError::UnknownChoice {
+                    at: source.at(value.span()),
+                    key: path.to_owned(),
+                    given: given.to_string(),
+                    allowed: kind.to_string(),
+                    nearest: keys::nearest_word(given, words),
+                });
+            }
+        }
+        (Kind::Texts, DeValue::Array(items)) => {
+            for item in items {
+                check_value(source, path, Kind::Text, item, errors);
+            }
+        }
+        (Kind::Curvatures, DeValue::Array(items)) => {
+            for item in items {
+                check_value(source, path, Kind::Curvature, item, errors);
+            }
+        }
+        (Kind::Point, DeValue::Array(items)) => {
+            if items.len() != 3 {
+                errors.push(ConfigError::WrongType {
+                    at: source.at(value.span()),
+                    key: path.to_owned(),
+                    expected: kind.to_string(),
+                    got: format!("{} values", items.len()),
+                });
+            }
+            for item in items {
+                match number(item.get_ref()) {
+                    Some(number) if number.is_finite() => {}
+                    _ => errors.push(wrong_type(item, kind)),
+                }
+            }
+        }
+        (Kind::Tables(_), DeValue::Array(items)) => {
+            for item in items {
+                match item.get_ref() {
+                    DeValue::Table(table) => {
+                        check_table(source, table, &format!("{path}[]"), errors)
+                    }
+                    _ => errors.push(wrong_type(item, kind)),
+                }
+            }
+        }
+        _ => errors.push(wrong_type(value, kind)),
+    }
+}
+
+/// The value of an integer or float; none for other types and integers beyond 64 bits.
+fn number(value: &DeValue<'_>) -> Option<f64> {
+    match value {
+        DeValue::Integer(given) => i64::from_str_radix(given.as_str(), given.radix())
+            .ok()
+            .map(|number| number as f64),
+        DeValue::Float(given) => given.as_str().parse().ok(),
+        _ => None,
+    }
+}
+
+fn raw<'v>(value: &'v DeValue<'_>) -> &'v str {
+    match value {
+        DeValue::Integer(given) => given.as_str(),
+        DeValue::Float(given) => given.as_str(),
+        _ => "",
+    }
+}
+
+/// A value in words, for "was given …".
+fn describe(value: &DeValue<'_>) -> String {
+    match value {
+        DeValue::String(text) => {
+            let mut start: String = text.chars().take(40).collect();
+            if start.len() < text.len() {
+                start.push('…');
+            }
+            format!("the text {start:?}")
+        }
+        DeValue::Integer(given) => format!("the integer {}", given.as_str()),
+        DeValue::Float(given) => format!("the number {}", given.as_str()),
+        DeValue::Boolean(given) => given.to_string(),
+        DeValue::Datetime(given) => format!("the date {given}"),
+        DeValue::Array(items) if items.is_empty() => "an empty list".to_owned(),
+        DeValue::Array(_) => "a list".to_owned(),
+        DeValue::Table(_) => "a table".to_owned(),
+    }
+}

@@ -1,0 +1,195 @@
+//! From text and overrides to a [`Config`].
+
+use super::Config;
+use super::check::{Source, check};
+use super::error::ConfigError;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use toml::de::DeTable;
+
+/// More than any configuration needs, even with thousands of cones; a mesh named by mistake is
+/// refused before it is read.
+const MAX_BYTES: u64 = 16 << 20;
+
+/// A configuration and where its relative paths start.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Loaded {
+    /// The effective configuration; paths as written.
+    pub config: Config,
+    /// Folder that relative `input.paths` start from: that of the configuration file, or the
+    /// current folder (empty path) where an override gave them.
+    pub input_base: PathBuf,
+    /// Folder that a relative `output.folder` starts from, by the same rule.
+    pub output_base: PathBuf,
+}
+
+impl Loaded {
+    /// The output folder, relative to the current folder or absolute.
+    #[must_use]
+    pub fn output_folder(&self) -> PathBuf {
+        self.output_base.join(&self.config.output.folder)
+    }
+}
+
+/// Reads a configuration file and applies overrides of the form `section.key=value`.
+///
+/// # Errors
+/// [`ConfigError`] where the file cannot be read, is no TOML, or holds a key, type or value that
+/// [`KEYS`](super::keys::KEYS) does not allow; likewise for each override.
+pub fn load(path: &Path, overrides: &[String]) -> Result<Loaded, ConfigError> {
+    let text = read_text(path)?;
+    let base = path.parent().unwrap_or(Path::new("")).to_owned();
+    let config = parse(&path.display().to_string(), &text, overrides)?;
+    let set = |key: &str| overrides.iter().any(|given| override_key(given) == key);
+    let base_of = |key: &str| {
+        if set(key) {
+            PathBuf::new()
+        } else {
+            base.clone()
+        }
+    };
+    Ok(Loaded {
+        input_base: base_of("input.paths"),
+        output_base: base_of("output.folder"),
+        config,
+    })
+}
+
+/// Parses a configuration text; `name` is what errors call it. An empty text gives the defaults.
+///
+/// # Errors
+/// As [`load`], but for those of reading a file.
+pub fn parse(name: &str, text: &str, overrides: &[String]) -> Result<Config, ConfigError> {
+    let file = Source {
+        name: name.to_owned(),
+        text: Arc::from(text),
+    };
+    let mut merged = parse_layer(&file)?;
+    let mut last = file;
+    for given in overrides {
+        last = override_source(given)?;
+        merge(&mut merged, parse_layer(&last)?);
+    }
+    // Each layer was accepted alone and a key is replaced as a whole, so this can only fail where
+    // a stage relates several of its keys.
+    Config::deserialize_table(merged).map_err(|error| refused(&last, &error))
+}
+
+impl Config {
+    fn deserialize_table(table: toml::Table) -> Result<Self, toml::de::Error> {
+        toml::Value::Table(table).try_into()
+    }
+}
+
+fn read_text(path: &Path) -> Result<String, ConfigError> {
+    let unreadable = |reason: String| ConfigError::Unreadable {
+        path: path.to_owned(),
+        reason,
+    };
+    let file = std::fs::File::open(path).map_err(|error| match error.kind() {
+        std::io::ErrorKind::NotFound => ConfigError::NotFound {
+            path: path.to_owned(),
+        },
+        _ => unreadable(error.to_string()),
+    })?;
+    let mut bytes = Vec::new();
+    file.take(MAX_BYTES + 1)
+        .read_to_end(&mut bytes)
+        .map_err(|error| unreadable(error.to_string()))?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(ConfigError::TooLong {
+            path: path.to_owned(),
+            bytes: std::fs::metadata(path).map_or(bytes.len() as u64, |data| data.len()),
+            limit: MAX_BYTES,
+        });
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        unreadable(format!(
+            "byte {} is not UTF-8 text",
+            error.utf8_error().valid_up_to()
+        ))
+    })
+}
+
+/// Checks one text by itself, so that every error has a place in it.
+fn parse_layer(source: &Source) -> Result<toml::Table, ConfigError> {
+    let table = DeTable::parse(&source.text).map_err(|error| syntax(source, &error))?;
+    check(source, table.get_ref())?;
+    toml::from_str::<Config>(&source.text).map_err(|error| refused(source, &error))?;
+    toml::from_str(&source.text).map_err(|error| syntax(source, &error))
+}
+
+fn syntax(source: &Source, error: &toml::de::Error) -> ConfigError {
+    let at = source.at(error.span().unwrap_or(0..0));
+    let before = source.text[..at.span.start].trim_end();
+    let word = at.offending();
+    // The most frequent slip: the parser takes `scheme = thurston` for a misspelt `true`.
+    let reason = if before.ends_with(['=', '[', ',']) && word.starts_with(char::is_alphabetic) {
+        format!("the word {word} is no value; only true and false stand without quotes")
+    } else {
+        error.message().to_owned()
+    };
+    ConfigError::Syntax { at, reason }
+}
+
+fn refused(source: &Source, error: &toml::de::Error) -> ConfigError {
+    let span = error.span().unwrap_or(0..0);
+    ConfigError::Refused {
+        key: key_at(source, span.start).unwrap_or_else(|| "configuration".to_owned()),
+        at: source.at(span),
+        reason: error.message().to_owned(),
+    }
+}
+
+/// Path of the `section.key` whose value holds byte `position`.
+fn key_at(source: &Source, position: usize) -> Option<String> {
+    let table = DeTable::parse(&source.text).ok()?;
+    for (section, keys) in table.get_ref() {
+        for (key, value) in keys.get_ref().as_table()? {
+            if (key.span().start..value.span().end.max(key.span().end)).contains(&position) {
+                return Some(format!("{}.{}", section.get_ref(), key.get_ref()));
+            }
+        }
+    }
+    None
+}
+
+fn override_key(given: &str) -> &str {
+    given.split('=').next().unwrap_or(given).trim()
+}
+
+/// An override is a TOML document of one line; a bare word becomes a text.
+fn override_source(given: &str) -> Result<Source, ConfigError> {
+    let Some((key, value)) = given.split_once('=') else {
+        return Err(ConfigError::OverrideWithoutValue {
+            given: given.to_owned(),
+        });
+    };
+    let (key, value) = (key.trim(), value.trim());
+    let plain = format!("{key} = {value}");
+    // A value that begins like a list, table or quoted text was meant as one: its syntax error
+    // helps more than a text that nobody asked for.
+    let structured = value.starts_with(['[', '{', '"', '\'']);
+    let text = if structured || DeTable::parse(&plain).is_ok() {
+        plain
+    } else {
+        format!("{key} = {}", toml::Value::String(value.to_owned()))
+    };
+    Ok(Source {
+        name: "--set".to_owned(),
+        text: Arc::from(text),
+    })
+}
+
+/// Later values replace earlier ones key by key; lists are replaced as a whole.
+fn merge(into: &mut toml::Table, from: toml::Table) {
+    for (key, value) in from {
+        match (into.get_mut(&key), value) {
+            (Some(toml::Value::Table(old)), toml::Value::Table(new)) => merge(old, new),
+            (_, value) => {
+                into.insert(key, value);
+            }
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! Configuration: from `config.toml` and `--set` to checked parameters of every stage.
+//!
+//! *Enters:* a TOML text and overrides. *Leaves:* a [`Config`] whose every value lies in the range
+//! that [`keys::KEYS`] states, or a [`ConfigError`] that names file, line, column, the offending
+//! text and the nearest known key.
+//!
+//! [`Config`] only composes the stages' own `Params`; defaults live beside the stages. What a user
+//! may write is described a second time, in words and ranges, by [`keys::KEYS`]; tests hold the
+//! two and the commented `config.toml` at the top of the repository together.
+
+pub mod assets;
+mod check;
+pub mod error;
+pub mod keys;
+mod load;
+mod sections;
+
+pub use error::{ConfigError, Location};
+pub use load::{Loaded, load, parse};
+pub use sections::*;
+
+use serde::{Deserialize, Serialize};
+
+/// The commented configuration that `affine-atlas init` writes. It parses to
+/// [`Config::default`] but for `input.paths`.
+pub const COMMENTED_DEFAULT: &str = include_str!("../../config.toml");
+
+/// Everything that a run needs to know beside the meshes themselves.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Which meshes.
+    pub input: InputParams,
+    /// Where the atlases go.
+    pub output: OutputParams,
+    /// How large an input file may be.
+    pub limits: ReadParams,
+    /// What may be changed to make a mesh a manifold.
+    pub repair: RepairParams,
+    /// Where the curvature goes (5.2).
+    pub cones: ConeParams,
+    /// What happens on boundary loops (5.2).
+    pub boundary: BoundaryParams,
+    /// Connectivity repair around cones (5.3).
+    pub connectivity: RefineParams,
+    /// The Ricci flow (3.3, 3.4, 4.2).
+    pub flow: FlowParams,
+    /// Patches and geometry images (5.5).
+    pub patches: PatchParams,
+    /// Pictures of the result.
+    pub pictures: PictureParams,
+    /// How the program runs; never changes a result.
+    pub run: RunParams,
+}
+
+impl Config {
+    /// The effective configuration without what cannot change an output byte of one asset: the
+    /// list of inputs, the output folder and the number of threads.
+    #[must_use]
+    pub fn canonical(&self) -> Self {
+        Self {
+            input: InputParams::default(),
+            output: OutputParams::default(),
+            run: RunParams::default(),
+            ..self.clone()
+        }
+    }
+
+    /// BLAKE3 of [`Config::canonical`] as JSON, 64 hexadecimal digits (`source.config_blake3`).
+    ///
+    /// Fields are written in the order of the structs, so the hash depends on values only:
+    /// neither comments, nor the order of keys, nor keys that repeat a default change it.
+    #[must_use]
+    pub fn hash(&self) -> String {
+        let text = serde_json::to_vec(&self.canonical())
+            .expect("the canonical configuration holds numbers, words and lists only");
+        blake3::hash(&text).to_hex().to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,65 @@
+//! The sections of [`Config`](super::Config).
+//!
+//! Most are the stages' own parameters; `[input]`, `[output]`, `[pictures]` and `[run]` belong here.
+
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+pub use crate::atlas::patches::PatchParams;
+pub use crate::flow::cones::{BoundaryParams, ConeParams};
+pub use crate::flow::refine::RefineParams;
+pub use crate::flow::ricci::FlowParams;
+pub use crate::read::ReadParams;
+pub use crate::repair::RepairParams;
+
+/// `[input]`: which meshes are turned into atlases.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct InputParams {
+    /// Mesh files as written; relative ones start at the folder of the configuration file.
+    pub paths: Vec<PathBuf>,
+}
+
+/// `[output]`: where the atlases go.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct OutputParams {
+    /// Folder that receives one folder an asset; a relative one starts at the folder of the
+    /// configuration file.
+    pub folder: PathBuf,
+}
+
+impl Default for OutputParams {
+    fn default() -> Self {
+        Self {
+            folder: PathBuf::from("affine-atlas-out"),
+        }
+    }
+}
+
+/// `[pictures]`: pictures of the result, drawn without a display.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PictureParams {
+    /// Whether pictures are drawn.
+    pub enabled: bool,
+    /// Pixels on the longer side of a picture.
+    pub size: usize,
+}
+
+impl Default for PictureParams {
+    fn default() -> Self {
+        Self {
+            enabled: true,
+            size: 1024,
+        }
+    }
+}
+
+/// `[run]`: how the program runs.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RunParams {
+    /// Threads for data-parallel loops; 0 takes one for each core.
+    pub threads: usize,
+}

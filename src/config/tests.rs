@@ -1,0 +1,440 @@
+use super::keys::{KEYS, Kind};
+use super::*;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// Paths of all leaves of a table, `section.key`.
+fn leaves(table: &toml::Table) -> BTreeSet<String> {
+    let mut paths = BTreeSet::new();
+    for (section, keys) in table {
+        for key in keys.as_table().expect("only sections at the top").keys() {
+            paths.insert(format!("{section}.{key}"));
+        }
+    }
+    paths
+}
+
+fn default_table() -> toml::Table {
+    toml::Table::try_from(Config::default()).expect("defaults can be written as TOML")
+}
+
+fn top_level_keys() -> impl Iterator<Item = &'static keys::Key> {
+    KEYS.iter().filter(|key| !key.path.contains("[]"))
+}
+
+/// Sets keys of the commented configuration, by replacing or uncommenting their line.
+fn commented_with(path: &str, value: &str) -> Result<Config, ConfigError> {
+    parse(
+        "config.toml",
+        COMMENTED_DEFAULT,
+        &[format!("{path}={value}")],
+    )
+}
+
+#[test]
+fn commented_default_is_the_default() {
+    let mut config = parse("config.toml", COMMENTED_DEFAULT, &[]).expect("parses");
+    assert!(!config.input.paths.is_empty());
+    config.input.paths.clear();
+    assert_eq!(config, Config::default());
+    assert_eq!(parse("empty", "", &[]).expect("parses"), Config::default());
+}
+
+#[test]
+fn key_table_default_and_commented_default_have_the_same_keys() {
+    let known: BTreeSet<String> = top_level_keys()
+        .filter(|key| key.has_default())
+        .map(|key| key.path.to_owned())
+        .collect();
+    assert_eq!(known, leaves(&default_table()));
+    let commented: toml::Table = toml::from_str(COMMENTED_DEFAULT).expect("parses");
+    assert_eq!(known, leaves(&commented));
+}
+
+#[test]
+fn key_table_states_the_defaults() {
+    let table = default_table();
+    for key in top_level_keys().filter(|key| key.has_default()) {
+        let (section, name) = key.path.split_once('.').expect("section.key");
+        let stated: toml::Table = toml::from_str(&format!("v = {}", key.default)).expect(key.path);
+        assert_eq!(stated["v"], table[section][name], "{}", key.path);
+    }
+}
+
+/// The line that states type, unit and range stands right above each key, a sentence that says
+/// what the key means above that.
+#[test]
+fn commented_default_describes_every_key() {
+    let lines: Vec<&str> = COMMENTED_DEFAULT.lines().collect();
+    let mut section = "";
+    let mut described = Vec::new();
+    for (i, line) in lines.iter().enumerate() {
+        if let Some(name) = line
+            .strip_prefix('[')
+            .and_then(|rest| rest.strip_suffix(']'))
+        {
+            section = name;
+        }
+        for key in KEYS
+            .iter()
+            .filter(|key| key.path.split('.').next() == Some(section))
+        {
+            let (parent, name) = key.path.rsplit_once('.').expect("section.key");
+            let description = format!("# {}", key.describe());
+            // A key of listed tables has a paragraph of its own that begins with its name.
+            let here = if parent.ends_with("[]") {
+                **line == *description && lines[i - 1].starts_with(&format!("# {name} of a "))
+            } else {
+                let value = line.strip_prefix("# ").unwrap_or(line);
+                value.starts_with(&format!("{name} = ")) && lines[i - 1] == description
+            };
+            if here {
+                let meaning = lines[i - if parent.ends_with("[]") { 1 } else { 2 }];
+                assert!(
+                    meaning.starts_with("# ") && meaning.len() > 12,
+                    "{}: {meaning}",
+                    key.path
+                );
+                described.push(key.path);
+            }
+        }
+    }
+    let expected: Vec<&str> = KEYS.iter().map(|key| key.path).collect();
+    assert_eq!(described, expected);
+}
+
+/// Lines such as `# list = […]` are examples that work when the `# ` is taken away.
+#[test]
+fn commented_examples_work() {
+    let mut examples = 0;
+    let mut section = "";
+    for line in COMMENTED_DEFAULT.lines() {
+        if let Some(name) = line
+            .strip_prefix('[')
+            .and_then(|rest| rest.strip_suffix(']'))
+        {
+            section = name;
+        }
+        let Some((name, value)) = line
+            .strip_prefix("# ")
+            .and_then(|rest| rest.split_once(" = "))
+        else {
+            continue;
+        };
+        if keys::find(&format!("{section}.{name}")).is_none() {
+            continue;
+        }
+        let config = commented_with(&format!("{section}.{name}"), value).expect(line);
+        assert_ne!(
+            config.hash(),
+            Config::default().hash(),
+            "{line} has no effect"
+        );
+        examples += 1;
+    }
+    assert!(examples >= 3);
+}
+
+#[test]
+fn every_word_is_accepted_and_no_other_exists() {
+    for key in top_level_keys() {
+        let Kind::Choice(words) = key.kind else {
+            continue;
+        };
+        for word in words {
+            commented_with(key.path, word).expect(key.path);
+        }
+        let (section, name) = key.path.split_once('.').expect("section.key");
+        let text = format!("[{section}]\n{name} = \"no such word\"");
+        let message = toml::from_str::<Config>(&text)
+            .expect_err("no such word")
+            .message()
+            .to_owned();
+        let known: BTreeSet<&str> = message.split('`').skip(3).step_by(2).collect();
+        assert_eq!(
+            known,
+            words.iter().copied().collect(),
+            "{}: {message}",
+            key.path
+        );
+    }
+}
+
+#[test]
+fn bounds_are_accepted_and_beyond_is_refused() {
+    for key in top_level_keys() {
+        let (good, bad) = match key.kind {
+            Kind::Integer { min, max } => (
+                vec![min.to_string(), max.to_string()],
+                vec![
+                    (min - 1).to_string(),
+                    (max + 1).to_string(),
+                    "99999999999999999999".to_owned(),
+                ],
+            ),
+            Kind::Number { min, max } | Kind::ZeroOr { min, max } => (
+                vec![format!("{min:?}"), format!("{max:?}")],
+                vec![
+                    format!("{:?}", max * 2.0),
+                    "-1.0".to_owned(),
+                    "nan".to_owned(),
+                    "inf".to_owned(),
+                ],
+            ),
+            _ => continue,
+        };
+        for value in good {
+            commented_with(key.path, &value).expect(key.path);
+        }
+        for value in bad {
+            let error = commented_with(key.path, &value).expect_err(key.path);
+            let (ConfigError::OutOfRange { .. } | ConfigError::Syntax { .. }) = error else {
+                panic!("{}={value}: {error}", key.path);
+            };
+        }
+    }
+}
+
+#[test]
+fn wrong_types_are_refused_for_every_key() {
+    for key in top_level_keys() {
+        let error = commented_with(key.path, "1979-05-27").expect_err(key.path);
+        assert!(matches!(error, ConfigError::WrongType { .. }), "{error}");
+        assert!(error.remedy().contains(&key.describe()));
+    }
+}
+
+#[test]
+fn overrides_replace_and_come_last() {
+    let overrides = [
+        "flow.scheme = thurston",
+        "flow.scheme=vertex-scaling",
+        "patches.padding=5",
+        "cones.list=[{ vertex = 3, curvature = -0.5 }]",
+        "input.paths=[\"a b.obj\"]",
+        "output.folder=some folder",
+    ]
+    .map(str::to_owned);
+    let config = parse(
+        "f",
+        "[flow]\nscheme = \"tangential\"\nsolver = \"gradient\"",
+        &overrides,
+    )
+    .expect("parses");
+    assert_eq!(
+        config.flow.scheme,
+        crate::flow::ricci::Scheme::VertexScaling
+    );
+    assert_eq!(config.flow.solver, crate::flow::ricci::Solver::Gradient);
+    assert_eq!(config.patches.padding, 5);
+    assert_eq!(config.cones.list.len(), 1);
+    assert_eq!(config.input.paths, [PathBuf::from("a b.obj")]);
+    assert_eq!(config.output.folder, Path::new("some folder"));
+}
+
+#[test]
+fn cones_as_sections_are_cones_in_a_list() {
+    let sections = "[[cones.list]]\nvertex = 3\ncurvature = 1\n[[cones.list]]\npoint = [0, 1.5, 2]\ncurvature = \"1/2\"";
+    let list = "[cones]\nlist = [{ vertex = 3, curvature = 1 }, { point = [0.0, 1.5, 2.0], curvature = \"1/2\" }]";
+    let parsed = |text: &str| parse("f", text, &[]).expect("parses");
+    assert_eq!(parsed(sections), parsed(list));
+    assert_eq!(parsed(sections).cones.list.len(), 2);
+}
+
+#[test]
+fn the_first_error_of_the_file_is_reported() {
+    let text = "[patches]\npading = 2\n[flow]\nscheme = \"newton\"\n";
+    let error = parse("f.toml", text, &[]).expect_err("two errors");
+    assert_eq!(
+        error.to_string(),
+        "f.toml:2:1: unknown key `patches.pading`"
+    );
+    assert_eq!(error.remedy(), "did you mean `patches.padding`?");
+    assert_eq!(
+        error.location().expect("in the text").excerpt(),
+        "pading = 2\n^^^^^^"
+    );
+}
+
+#[test]
+fn messages() {
+    let cases: &[(&str, &str, &str)] = &[
+        (
+            "flow = 3",
+            "f:1:8: `flow` takes keys of its own, written below a line [flow], but was given the integer 3",
+            "",
+        ),
+        (
+            "threads = 3",
+            "f:1:1: unknown key `threads`",
+            "did you mean `run.threads`?",
+        ),
+        (
+            "[folw]\n",
+            "f:1:2: unknown section `folw`",
+            "did you mean `flow`?",
+        ),
+        (
+            "[flow]\nscheme = \"thurstn\"",
+            "f:2:10: `flow.scheme` has no choice \"thurstn\"",
+            "did you mean \"thurston\"?",
+        ),
+        (
+            "[flow]\nscheme = true",
+            "f:2:10: `flow.scheme` takes \"tangential\", \"thurston\", \"inversive-distance\" or \"vertex-scaling\", but was given true",
+            "",
+        ),
+        (
+            "[flow]\ncurvature_tolerance = 1.0",
+            "f:2:23: `flow.curvature_tolerance` takes a number from 1e-13 to 1e-9, but was given 1.0",
+            "`flow.curvature_tolerance`: a number",
+        ),
+        (
+            "[cones]\nlist = [{ vertx = 1, curvature = 1 }]",
+            "f:2:11: unknown key `cones.list[].vertx`",
+            "did you mean `cones.list[].vertex`?",
+        ),
+        (
+            "[cones]\nlist = [{ vertex = 1 }]",
+            "f:2:9: `cones.list` is not usable: missing field `curvature`",
+            "",
+        ),
+        (
+            "[cones]\nlist = [{ point = [1, 2], curvature = 1 }]",
+            "f:2:19: `cones.list[].point` takes three numbers such as [0.0, 1.5, -2.0], but was given 2 values",
+            "",
+        ),
+        (
+            "[cones]\ncurvature = nan",
+            "f:2:13: `cones.curvature` takes a finite number, but was given nan",
+            "",
+        ),
+        (
+            "[input]\npaths = \"a.obj\"",
+            "f:2:9: `input.paths` takes a list of texts in quotes, but was given the text \"a.obj\"",
+            "",
+        ),
+        (
+            "[input]\npaths = [1]",
+            "f:2:10: `input.paths` takes a text in quotes, but was given the integer 1",
+            "",
+        ),
+    ];
+    for (text, message, remedy) in cases {
+        let error = parse("f", text, &[]).expect_err(text);
+        assert_eq!(error.to_string(), *message);
+        assert!(error.remedy().starts_with(remedy), "{}", error.remedy());
+    }
+}
+
+#[test]
+fn errors_of_overrides_show_the_override() {
+    let error = parse("f", "", &["flow.shceme=thurston".to_owned()]).expect_err("unknown");
+    assert_eq!(error.to_string(), "--set:1:6: unknown key `flow.shceme`");
+    assert_eq!(error.remedy(), "did you mean `flow.scheme`?");
+    let error = parse("f", "", &["flow.scheme=tangental".to_owned()]).expect_err("unknown");
+    assert_eq!(
+        error.to_string(),
+        "--set:1:15: `flow.scheme` has no choice \"tangental\""
+    );
+    let error = parse("f", "", &["flow.scheme".to_owned()]).expect_err("no value");
+    assert_eq!(error.to_string(), "`--set flow.scheme` gives no value");
+    let error = parse("f", "", &["cones.list=[{]".to_owned()]).expect_err("no TOML");
+    assert!(matches!(error, ConfigError::Syntax { .. }), "{error}");
+}
+
+/// No text makes it panic, and every error has a place inside the text.
+#[test]
+fn damaged_texts_never_panic() {
+    let text = COMMENTED_DEFAULT;
+    let boundaries: Vec<usize> = text.char_indices().map(|(i, _)| i).collect();
+    for (n, &i) in boundaries.iter().enumerate() {
+        // Every cut, and a different stray character at every place.
+        let stray = ['[', '"', '=', '\0', 'π', '{', '\n', ']'][n % 8];
+        for damaged in [
+            text[..i].to_owned(),
+            format!("{}{stray}{}", &text[..i], &text[i..]),
+        ] {
+            // Most of the file is comments, where nothing can happen.
+            if n % 7 != 0 && text[..i].rfind('#') > text[..i].rfind('\n') {
+                continue;
+            }
+            if let Err(error) = parse("f", &damaged, &[]) {
+                let at = error.location().expect("an error of the text");
+                assert!(at.span.end <= damaged.len() && !at.excerpt().is_empty());
+            }
+        }
+    }
+    for deep in [
+        "[".repeat(100_000),
+        "a.".repeat(100_000),
+        format!("a = {}", "{a=".repeat(100_000)),
+    ] {
+        parse("f", &deep, &[]).expect_err("no configuration");
+    }
+}
+
+#[test]
+fn hash_depends_on_values_that_change_a_result() {
+    let hash = |text: &str| parse("f", text, &[]).expect("parses").hash();
+    let default = Config::default().hash();
+    assert_eq!(default.len(), 64);
+    assert_eq!(hash(COMMENTED_DEFAULT), default);
+    assert_eq!(
+        hash("[run]\nthreads = 2\n[output]\nfolder = \"x\"\n[input]\npaths = [\"a.obj\"]"),
+        default
+    );
+    for key in top_level_keys() {
+        let section = key.path.split('.').next().expect("section");
+        let value = match key.kind {
+            Kind::Bool => (key.default != "true").to_string(),
+            Kind::Integer { max, .. } => max.to_string(),
+            Kind::Number { max, .. } | Kind::ZeroOr { max, .. } => format!("{max:?}"),
+            Kind::Choice(words) => words[words.len() - 1].to_owned(),
+            _ => continue,
+        };
+        let changed = commented_with(key.path, &value).expect(key.path).hash();
+        assert_eq!(
+            changed == default,
+            matches!(section, "run"),
+            "{}={value}",
+            key.path
+        );
+    }
+}
+
+#[test]
+fn relative_paths_start_at_the_file_or_the_current_folder() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("my.toml");
+    std::fs::write(&file, "[input]\npaths = [\"a.obj\"]").expect("written");
+    let loaded = load(&file, &["output.folder=there".to_owned()]).expect("loads");
+    assert_eq!(loaded.input_base, folder.path());
+    assert_eq!(loaded.output_base, Path::new(""));
+    assert_eq!(loaded.output_folder(), Path::new("there"));
+    let loaded = load(&file, &[]).expect("loads");
+    assert_eq!(
+        loaded.output_folder(),
+        folder.path().join("affine-atlas-out")
+    );
+}
+
+#[test]
+fn unreadable_files_are_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("config.toml");
+    assert!(matches!(
+        load(&file, &[]),
+        Err(ConfigError::NotFound { .. })
+    ));
+    assert!(matches!(
+        load(folder.path(), &[]),
+        Err(ConfigError::Unreadable { .. })
+    ));
+    std::fs::write(&file, [b'#', 0xff, 0xfe]).expect("written");
+    let error = load(&file, &[]).expect_err("no UTF-8");
+    assert!(
+        error.to_string().ends_with("byte 1 is not UTF-8 text"),
+        "{error}"
+    );
+}

@@ -1,0 +1,168 @@
+//! Every way in which a build can end without an atlas.
+
+use crate::atlas::charts::ChartError;
+use crate::atlas::cut::CutError;
+use crate::atlas::develop::DevelopError;
+use crate::atlas::patches::PatchError;
+use crate::export::ExportError;
+use crate::flow::cones::ConeError;
+use crate::flow::feasibility::Violation;
+use crate::flow::refine::RefineError;
+use crate::flow::ricci::FlowError;
+use crate::geometry::ids::{FaceId, NONE, VertexId};
+use crate::geometry::mesh::Mesh;
+use crate::outcome::{Failure, FailureKind};
+use crate::read::ReadError;
+use crate::repair::{ComponentError, RepairError};
+
+/// Why there is no atlas: the error of the stage that stopped.
+#[derive(Debug, thiserror::Error)]
+pub enum BuildError {
+    /// The file was refused.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The triangles were refused.
+    #[error(transparent)]
+    Repair(#[from] RepairError),
+    /// This component was refused.
+    #[error(transparent)]
+    Component(#[from] ComponentError),
+    /// The curvature asked for cannot exist.
+    #[error(transparent)]
+    Cones(#[from] ConeError),
+    /// Connectivity could not be repaired.
+    #[error(transparent)]
+    Refine(#[from] RefineError),
+    /// The flow found no metric.
+    #[error(transparent)]
+    Flow(FlowError),
+    /// The surface could not be slit.
+    #[error(transparent)]
+    Cut(#[from] CutError),
+    /// The metric could not be developed.
+    #[error(transparent)]
+    Develop(#[from] DevelopError),
+    /// The charts could not be made.
+    #[error(transparent)]
+    Chart(#[from] ChartError),
+    /// The patches could not be made.
+    #[error(transparent)]
+    Patch(#[from] PatchError),
+    /// Nothing could be written.
+    #[error(transparent)]
+    Export(ExportError),
+    /// Somebody asked to stop.
+    #[error("stopped before it was finished: nothing was written")]
+    Cancelled,
+}
+
+impl BuildError {
+    /// An error of the flow, with the indices of the input file in place of the mesh's own.
+    pub(super) fn flow(error: FlowError, mesh: &Mesh) -> Self {
+        match error {
+            FlowError::Cancelled => BuildError::Cancelled,
+            other => BuildError::Flow(in_source(other, mesh)),
+        }
+    }
+
+    /// The word of the manifest.
+    pub fn kind(&self) -> FailureKind {
+        match self {
+            BuildError::Read(_) | BuildError::Repair(_) | BuildError::Component(_) => {
+                FailureKind::Input
+            }
+            BuildError::Cones(_) | BuildError::Refine(_) => FailureKind::Prescription,
+            BuildError::Flow(FlowError::Infeasible(_) | FlowError::BadTarget { .. }) => {
+                FailureKind::Prescription
+            }
+            BuildError::Flow(FlowError::GaussBonnet { .. }) => FailureKind::Prescription,
+            BuildError::Flow(FlowError::BadLength { .. }) => FailureKind::Input,
+            BuildError::Flow(_) | BuildError::Develop(_) => FailureKind::NotConverged,
+            BuildError::Cut(CutError::NothingToCutAlong) => FailureKind::Prescription,
+            BuildError::Cut(_) => FailureKind::Internal,
+            BuildError::Chart(ChartError::TooManySectors { .. }) => FailureKind::Prescription,
+            BuildError::Chart(ChartError::Develop(_)) => FailureKind::NotConverged,
+            BuildError::Patch(PatchError::NotFinite { .. }) => FailureKind::NotConverged,
+            BuildError::Patch(_) => FailureKind::Prescription,
+            BuildError::Export(error) if error.is_internal() => FailureKind::Internal,
+            BuildError::Export(_) => FailureKind::Output,
+            BuildError::Cancelled => FailureKind::Internal,
+        }
+    }
+}
+
+/// The same error with indices of the input file. A vertex that repair put in is named by one of the face it
+/// was put into.
+fn in_source(error: FlowError, mesh: &Mesh) -> FlowError {
+    let c = &mesh.connectivity;
+    let vertex = |v: VertexId| {
+        let around = std::iter::once(v).chain(c.neighbours(v));
+        let known = around.map(|w| mesh.source_vertex[w]).find(|&s| s != NONE);
+        known.map_or(v, |s| VertexId::new(s as usize))
+    };
+    let face = |f: FaceId| FaceId::new(mesh.source_face[f] as usize);
+    match error {
+        FlowError::BadLength {
+            edge,
+            vertices,
+            length,
+        } => FlowError::BadLength {
+            edge,
+            vertices: vertices.map(vertex),
+            length,
+        },
+        FlowError::BadTarget {
+            vertex: v,
+            curvature,
+            bound,
+        } => FlowError::BadTarget {
+            vertex: vertex(v),
+            curvature,
+            bound,
+        },
+        FlowError::Infeasible(violation) => FlowError::Infeasible(Violation {
+            vertex: vertex(violation.vertex),
+            ..violation
+        }),
+        FlowError::NotConverged {
+            scheme,
+            iterations,
+            max_error,
+            tolerance,
+            broken,
+            faces,
+        } => FlowError::NotConverged {
+            scheme,
+            iterations,
+            max_error,
+            tolerance,
+            broken,
+            faces: {
+                // Several faces of the mesh can lie in one of the file.
+                let mut faces: Vec<FaceId> = faces.into_iter().map(face).collect();
+                faces.sort_unstable();
+                faces.dedup();
+                faces
+            },
+        },
+        other => other,
+    }
+}
+
+impl From<ExportError> for BuildError {
+    fn from(error: ExportError) -> Self {
+        match error {
+            ExportError::Interrupted => BuildError::Cancelled,
+            other => BuildError::Export(other),
+        }
+    }
+}
+
+impl From<&BuildError> for Failure {
+    fn from(error: &BuildError) -> Self {
+        Failure {
+            kind: error.kind(),
+            message: error.to_string(),
+        }
+    }
+}

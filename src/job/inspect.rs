@@ -1,0 +1,169 @@
+//! What a build would do with an asset, without building it.
+
+use super::{BuildError, refine_for};
+use crate::config::Config;
+use crate::flow::cones::{self, BoundaryCondition, Prescription, in_pi};
+use crate::geometry::mesh::Mesh;
+use crate::outcome::Failure;
+use crate::product::ConnectivityRepair;
+use crate::read;
+use crate::repair::{self, Component};
+use std::f64::consts::PI;
+use std::fmt::{self, Write as _};
+use std::path::Path;
+
+/// What `check` says of one asset.
+pub struct Inspection {
+    text: String,
+    failures: Vec<Failure>,
+}
+
+impl Inspection {
+    /// Why parts of the asset would be refused, as far as that is known before the flow.
+    pub fn failures(&self) -> &[Failure] {
+        &self.failures
+    }
+}
+
+impl fmt::Display for Inspection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+/// Reads and repairs an asset, and says topology, Gauss–Bonnet budget, cones, and what would change.
+pub fn inspect(path: &Path, config: &Config) -> Result<Inspection, BuildError> {
+    let asset = read::read(path, &config.limits)?;
+    let soup = &asset.soup;
+    let repaired = repair::repair(soup, &config.repair)?;
+    let requests = cones::assign(&repaired, &config.cones, &config.boundary)?;
+    let mut text = String::new();
+    let count = repaired.components.len();
+    let mut line = |s: String| {
+        let _ = writeln!(text, "{s}");
+    };
+    line(format!(
+        "{}, {}, {}",
+        counted(soup.positions.len(), "vertex", "vertices"),
+        counted(soup.faces.len(), "triangle", "triangles"),
+        counted(count, "component", "components")
+    ));
+    for note in &asset.notes {
+        line(format!("note: {note}"));
+    }
+    let mut failures = Vec::new();
+    for (i, (component, requests)) in repaired.components.into_iter().zip(requests).enumerate() {
+        if count > 1 {
+            line(format!("component {i}:"));
+        }
+        let changes = component.log.summary();
+        let changes = if component.log.is_empty() {
+            "nothing"
+        } else {
+            changes.as_str()
+        };
+        line(format!("  repair: {changes}"));
+        match plan(component, &requests, config) {
+            Ok((mesh, prescription, repair)) => describe(&mesh, &prescription, &repair, &mut line),
+            Err(error) => {
+                line(format!("  refused: {error}"));
+                failures.push(Failure::from(&error));
+            }
+        }
+    }
+    Ok(Inspection { text, failures })
+}
+
+/// Everything up to the flow.
+fn plan(
+    component: Component,
+    requests: &cones::Requests,
+    config: &Config,
+) -> Result<(Mesh, Prescription, ConnectivityRepair), BuildError> {
+    let mesh = component.mesh?;
+    let prescription = cones::prescribe(&mesh, requests, &config.cones, &config.boundary)?;
+    Ok(refine_for(config, mesh, prescription)?)
+}
+
+fn describe(
+    mesh: &Mesh,
+    prescription: &Prescription,
+    repair: &ConnectivityRepair,
+    line: &mut impl FnMut(String),
+) {
+    let t = mesh.connectivity.topology();
+    line(format!(
+        "  topology: genus {}, {}, Euler characteristic {}",
+        t.genus,
+        counted(t.boundary_loops, "boundary loop", "boundary loops"),
+        t.euler_characteristic
+    ));
+    line(match repair.splits {
+        0 => "  connectivity repair: nothing".to_owned(),
+        splits => format!(
+            "  connectivity repair: {}, then {} vertices and {} faces",
+            counted(splits, "split", "splits"),
+            t.vertices,
+            t.faces
+        ),
+    });
+    let required = in_pi(2.0 * PI * t.euler_characteristic as f64);
+    let given = in_pi(prescription.cones.iter().map(|c| c.curvature).sum());
+    let free = t.boundary_loops > 0 && prescription.boundary == BoundaryCondition::Free;
+    line(if free {
+        format!(
+            "  Gauss–Bonnet: {required} required, {given} on cones, the rest falls on the free boundary"
+        )
+    } else {
+        format!("  Gauss–Bonnet: {required} required, {given} prescribed")
+    });
+    if prescription.cones.is_empty() {
+        line("  cones: none".to_owned());
+    }
+    for (inside, curvature, vertices) in by_curvature(mesh, prescription) {
+        let count = match inside {
+            true => counted(vertices.len(), "cone", "cones"),
+            false => counted(vertices.len(), "boundary vertex", "boundary vertices"),
+        };
+        let curvature = in_pi(curvature);
+        line(format!("  {count} of {curvature}: {}", listed(&vertices)));
+    }
+}
+
+/// Vertices of the file that get the same curvature, inside or on the boundary; in the order of the first of each.
+fn by_curvature(mesh: &Mesh, prescription: &Prescription) -> Vec<(bool, f64, Vec<u32>)> {
+    let mut groups: Vec<(bool, f64, Vec<u32>)> = Vec::new();
+    for cone in &prescription.cones {
+        let vertex = mesh.source_vertex[cone.vertex];
+        let inside = !mesh.connectivity.is_boundary_vertex(cone.vertex);
+        let same = |g: &&mut (bool, f64, _)| g.0 == inside && g.1 == cone.curvature;
+        match groups.iter_mut().find(same) {
+            Some((_, _, vertices)) => vertices.push(vertex),
+            None => groups.push((inside, cone.curvature, vec![vertex])),
+        }
+    }
+    groups
+}
+
+/// At most so many vertices stand in one line.
+const LISTED: usize = 12;
+
+/// `at vertices 3, 7 and 9 of the file`.
+fn listed(vertices: &[u32]) -> String {
+    let names: Vec<String> = vertices.iter().map(u32::to_string).collect();
+    match &names[..] {
+        [only] => format!("at vertex {only} of the file"),
+        many if many.len() > LISTED => format!(
+            "at vertices {} … of the file, {} more",
+            many[..LISTED].join(", "),
+            many.len() - LISTED
+        ),
+        [first @ .., last] => format!("at vertices {} and {last} of the file", first.join(", ")),
+        [] => String::new(),
+    }
+}
+
+/// A count with its noun.
+fn counted(count: usize, one: &str, several: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { several })
+}

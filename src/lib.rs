@@ -1,0 +1,72 @@
+//! Affine atlases of triangle meshes by discrete Ricci flow.
+//!
+//! A surface with a flat cone metric has an atlas whose transitions are rotations and translations.
+//! This crate repairs a mesh, chooses cones, finds the metric, slits the surface into a disk, covers it with a
+//! central chart, boundary charts and node charts, and samples geometry images over injective patches.
+//! It implements the pipeline of Gu, Luo, Yau, *Tutorial on Discrete Ricci Flow for Global
+//! Parameterizations* (section 5.1); equation and section numbers in these docs are the tutorial's.
+//!
+//! ```text
+//! read → repair → cones → connectivity repair → lengths → Ricci flow → cut → central chart → charts
+//!                                                                        ↓
+//!            write ← report ← geometry images ← patches ←────────────────┘
+//! ```
+//!
+//! Every arrow is a function from finished values to a finished value; [`job`] is the page on which they
+//! stand in order. Dependencies point one way: `geometry` ← `flow` ← `atlas` ← `product` ← `report`,
+//! `export`; `read` and `repair` know `geometry` only; [`verify`] reads what was written and shares no
+//! code with the stages that made it.
+//!
+//! ```
+//! use affine_atlas::{build, config::Config, geometry::mesh::Soup};
+//!
+//! // A tetrahedron: four cones of π, no flow needed beyond rounding.
+//! let soup = Soup::from_triangles(
+//!     vec![[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]],
+//!     vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
+//! );
+//! let mut config = Config::default();
+//! config.cones.count = 4;
+//! let atlases = build(&soup, &config, &())?;
+//! let atlas = atlases[0].as_ref().unwrap();
+//! assert_eq!(atlas.prescription.cones.len(), 4);
+//! assert!(atlas.metric.max_curvature_error < 1e-10);
+//! # Ok::<(), affine_atlas::job::BuildError>(())
+//! ```
+//!
+//! # Symbols
+//!
+//! | symbol | name in code | meaning |
+//! | --- | --- | --- |
+//! | K, K̄ | `curvature`, `target_curvature` | angle defect (3), (4) and its prescription, radians |
+//! | u | `log_scale` | logarithm of the length scale at a vertex; ln γ for packings |
+//! | γ, Φ | `radius`, `phi` | radii and intersection angles of a circle packing |
+//! | l, l̄ | `length`, `source_length` | flat length and length in space |
+//! | θ | `angle` | corner angle, radians |
+//! | χ, g | `euler_characteristic`, `genus` | V − E + F and the number of handles |
+//! | φ | `transition`, `gluing` | rigid motions between charts and across the cut |
+//!
+//! # References
+//!
+//! * D. X. Gu, F. Luo, S.-T. Yau. *Tutorial on Discrete Ricci Flow for Global Parameterizations.*
+//! * B. Chow, F. Luo. *Combinatorial Ricci flows on surfaces.* J. Differential Geom. 63, 2003.
+//! * X. D. Gu, F. Luo, J. Sun, T. Wu. *A discrete uniformization theorem for polyhedral surfaces.* J. Differential Geom. 109, 2018.
+//! * D. Glickenstein. *Discrete conformal variations and scalar curvature on piecewise flat manifolds.* J. Differential Geom. 87, 2011.
+//! * J. Erickson, K. Whittlesey. *Greedy optimal homotopy and homology generators.* SODA 2005.
+//! * X. Gu, S. Gortler, H. Hoppe. *Geometry images.* SIGGRAPH 2002.
+
+pub mod atlas;
+pub mod config;
+pub mod export;
+pub mod flow;
+pub mod geometry;
+pub mod job;
+pub mod observe;
+pub mod outcome;
+pub mod product;
+pub mod read;
+pub mod repair;
+pub mod report;
+pub mod verify;
+
+pub use job::build;

@@ -1,0 +1,85 @@
+//! The `affine-atlas` command: arguments → configuration → one job an asset → exit code.
+//!
+//! Everything that computes lives in the library; [`cli`] only reads arguments, shows progress
+//! and words results. What the command asks of the library stands in [`WORK`].
+
+mod cli;
+
+use affine_atlas::config::Config;
+use affine_atlas::config::assets::Asset;
+use affine_atlas::export::folder::remove_all_staging;
+use affine_atlas::export::manifest::{Manifest, Record};
+use affine_atlas::job::{self, BuildError};
+use affine_atlas::observe::Observer;
+use affine_atlas::outcome::{AssetOutcome, Failure, FailureKind};
+use affine_atlas::read::{self, ReadParams};
+use affine_atlas::verify::{self, SourceSurface, VerifyOptions};
+use cli::work::{Inspection, VerifyRequest, VerifyResult, Work};
+use std::path::Path;
+use std::process::ExitCode;
+
+/// The one place where the command meets the library.
+const WORK: Work = Work {
+    build,
+    record,
+    inspect,
+    verify,
+    remove_staging: remove_all_staging,
+};
+
+fn main() -> ExitCode {
+    cli::main(&WORK)
+}
+
+fn build(asset: &Asset, output: &Path, config: &Config, observer: &dyn Observer) -> AssetOutcome {
+    let given = asset.given.to_string_lossy();
+    job::run(&asset.path, &given, output, &asset.id, config, observer)
+}
+
+fn record(output: &Path, config: &Config, outcomes: &[AssetOutcome]) -> Result<(), Failure> {
+    let failure = |error| Failure::from(&BuildError::Export(error));
+    let (mut manifest, _) = Manifest::load(output).map_err(failure)?;
+    let config_hash = config.hash();
+    for outcome in outcomes {
+        manifest.insert(Record::of(outcome, &config_hash));
+    }
+    manifest.save(output).map_err(failure)
+}
+
+fn inspect(asset: &Asset, config: &Config) -> Result<Inspection, Failure> {
+    let inspection = job::inspect(&asset.path, config).map_err(|e| Failure::from(&e))?;
+    Ok(Inspection {
+        text: inspection.to_string(),
+        refused: !inspection.failures().is_empty(),
+    })
+}
+
+fn verify(request: &VerifyRequest) -> Result<VerifyResult, Failure> {
+    let refused = |message: String| Failure {
+        kind: FailureKind::Input,
+        message,
+    };
+    let options = VerifyOptions {
+        cones: request.cones,
+        ..VerifyOptions::default()
+    };
+    let source = match &request.source {
+        Some(path) => Some(
+            read::read(path, &ReadParams::default())
+                .map_err(|error| refused(error.to_string()))?
+                .soup,
+        ),
+        None => None,
+    };
+    let surface = source.as_ref().map(|soup| SourceSurface {
+        positions: &soup.positions,
+        faces: &soup.faces,
+    });
+    let verdicts = verify::verify_against(&request.folder, &options, surface.as_ref())
+        .map_err(|error| refused(error.to_string()))?;
+    Ok(VerifyResult {
+        text: verdicts.to_string(),
+        failed: verdicts.failed(),
+        json: serde_json::json!(verdicts),
+    })
+}
