@@ -1,0 +1,267 @@
+//! The whole program on real models, checked by code that shares nothing with it.
+//!
+//! `AFFINE_ATLAS_CORPUS` names a folder with the models (`dirty/` and `gltf/` below it); without it every case is
+//! reported as ignored. `AFFINE_ATLAS_CHECKER` names an independent checker of output folders (a
+//! Python script, run by `AFFINE_ATLAS_PYTHON` or `python3`); without it only the program's own `verify` is asked.
+
+use libtest_mimic::{Arguments, Failed, Trial};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// File, genus, boundary loops.
+const CLEAN: [(&str, usize, usize); 18] = [
+    ("spot.obj", 0, 0),
+    ("bunny-closed.off", 0, 0),
+    ("nefertiti.obj", 0, 0),
+    ("fandisk.off", 0, 0),
+    ("bumpy-cube.obj", 0, 0),
+    ("rocker-arm.obj", 1, 0),
+    ("kitten.obj", 1, 0),
+    ("brezel.obj", 2, 0),
+    ("three-holes.off", 3, 0),
+    ("elephant-genus3.obj", 3, 0),
+    ("fertility.off", 4, 0),
+    ("face.obj", 0, 1),
+    ("camelhead.off", 0, 1),
+    ("lilium.obj", 0, 1),
+    ("lego.ply", 0, 1),
+    ("punctured-torus.obj", 1, 1),
+    ("stanford-bunny.obj", 0, 5),
+    ("beetle.obj", 0, 11),
+];
+
+/// What is done with the corpus' folder.
+type Case = Box<dyn FnOnce(&Path) -> Result<(), Failed> + Send>;
+
+fn main() {
+    let arguments = Arguments::from_args();
+    let corpus = std::env::var_os("AFFINE_ATLAS_CORPUS").map(PathBuf::from);
+    let mut trials = Vec::new();
+    let mut add = |name: String, run: Case| {
+        let folder = corpus.clone();
+        let trial = Trial::test(name, move || match folder {
+            Some(folder) => run(&folder),
+            None => Ok(()),
+        });
+        trials.push(trial.with_ignored_flag(corpus.is_none()));
+    };
+    for (file, genus, loops) in CLEAN {
+        let run = move |corpus: &Path| clean(&corpus.join(file), genus, loops);
+        add(format!("clean/{file}"), Box::new(run));
+    }
+    for (file, curvature) in [("three-holes.off", "-8"), ("fertility.off", "-12")] {
+        let run = move |corpus: &Path| single_cone(&corpus.join(file), curvature);
+        add(format!("single-cone/{file}"), Box::new(run));
+    }
+    add("rocker-arm/exact-lengths".into(), Box::new(rocker_arm));
+    add("spot/quarter-turns".into(), Box::new(quarter_turns));
+    for folder in ["dirty", "gltf"] {
+        for file in corpus.iter().flat_map(|c| models(&c.join(folder))) {
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            let name = format!("{folder}/{name}");
+            add(name, Box::new(move |_: &Path| atlas_or_refusal(&file)));
+        }
+    }
+    libtest_mimic::run(&arguments, trials).exit();
+}
+
+/// Model files of a folder, by name.
+fn models(folder: &Path) -> Vec<PathBuf> {
+    let known = ["obj", "off", "ply", "stl", "gltf", "glb"];
+    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
+        .into_iter()
+        .flatten()
+        .filter_map(|entry| entry.ok().map(|e| e.path()))
+        .filter(|p| p.extension().is_some_and(|e| known.iter().any(|k| e == *k)))
+        .collect();
+    files.sort();
+    files
+}
+
+/// A finished build in a temporary folder.
+struct Built {
+    folder: tempfile::TempDir,
+    output: Output,
+}
+
+impl Built {
+    /// Folders that hold an `atlas.json`, by name.
+    fn atlases(&self) -> Vec<PathBuf> {
+        let mut found = Vec::new();
+        let mut open = vec![self.folder.path().to_path_buf()];
+        while let Some(folder) = open.pop() {
+            if folder.join("atlas.json").is_file() {
+                found.push(folder.clone());
+            }
+            let entries = std::fs::read_dir(&folder).into_iter().flatten().flatten();
+            open.extend(entries.map(|e| e.path()).filter(|p| p.is_dir()));
+        }
+        found.sort();
+        found
+    }
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn program() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_affine-atlas"))
+}
+
+fn build(model: &Path, settings: &[&str]) -> Result<Built, Failed> {
+    let folder = tempfile::tempdir()?;
+    let mut command = program();
+    command.arg("build").arg(model);
+    command.arg("--out").arg(folder.path());
+    for setting in settings {
+        command.arg("--set").arg(setting);
+    }
+    let output = command.output()?;
+    Ok(Built { folder, output })
+}
+
+/// Builds a model that must give exactly one atlas; returns its folder and `atlas.json`.
+fn build_one(
+    model: &Path,
+    settings: &[&str],
+) -> Result<(Built, PathBuf, serde_json::Value), Failed> {
+    let built = build(model, settings)?;
+    let atlases = built.atlases();
+    let [atlas] = &atlases[..] else {
+        let said = text(&built.output.stdout) + &text(&built.output.stderr);
+        return Err(format!("{} atlases: {said}", atlases.len()).into());
+    };
+    let atlas = atlas.clone();
+    let json = serde_json::from_slice(&std::fs::read(atlas.join("atlas.json"))?)?;
+    Ok((built, atlas, json))
+}
+
+/// Asks the program and, where there is one, the independent checker.
+fn verify(atlas: &Path, source: Option<&Path>, cones: Option<usize>) -> Result<(), Failed> {
+    let own = program().arg("verify").arg(atlas).output()?;
+    if !own.status.success() {
+        return Err(failures("verify", &own).into());
+    }
+    let Some(checker) = std::env::var_os("AFFINE_ATLAS_CHECKER") else {
+        return Ok(());
+    };
+    let python = std::env::var_os("AFFINE_ATLAS_PYTHON").unwrap_or_else(|| "python3".into());
+    let mut command = Command::new(python);
+    command.arg(checker).arg(atlas);
+    if let Some(source) = source {
+        command.arg("--source").arg(source);
+    }
+    if let Some(cones) = cones {
+        command.arg("--cones").arg(cones.to_string());
+    }
+    let output = command.output()?;
+    if output.status.success() {
+        Ok(())
+    } else {
+        Err(failures("checker", &output).into())
+    }
+}
+
+fn failures(who: &str, output: &Output) -> String {
+    let lines = text(&output.stdout);
+    let failed: Vec<&str> = lines.lines().filter(|l| l.starts_with("FAIL")).collect();
+    format!("{who}: {}\n{}", failed.join("\n"), text(&output.stderr))
+}
+
+fn max_error(json: &serde_json::Value) -> f64 {
+    let error = &json["metric"]["max_curvature_error"];
+    error.as_f64().unwrap_or(f64::INFINITY)
+}
+
+fn clean(model: &Path, genus: usize, loops: usize) -> Result<(), Failed> {
+    let (_built, atlas, json) = build_one(model, &["flow.scheme=tangential"])?;
+    if json["topology"]["genus"] != genus || json["topology"]["boundary_loops"] != loops {
+        return Err(format!("topology is {}", json["topology"]).into());
+    }
+    if max_error(&json) > 1e-10 {
+        return Err(format!("curvature error {}", max_error(&json)).into());
+    }
+    let cones = match (genus, loops) {
+        (0, 0) => 8,
+        (g, 0) if g > 1 => 2 * g - 2,
+        _ => 0,
+    };
+    // The checker compares with the source of OBJ and OFF files only.
+    let extension = model.extension();
+    let comparable = extension.is_some_and(|e| e == "obj" || e == "off");
+    verify(&atlas, comparable.then_some(model), Some(cones))
+}
+
+/// Fig. 8, 20 and 21: all curvature at one vertex.
+fn single_cone(model: &Path, curvature: &str) -> Result<(), Failed> {
+    let settings = ["flow.scheme=tangential", "cones.strategy=single"];
+    let (_built, atlas, json) = build_one(model, &settings)?;
+    let expected = curvature.parse::<f64>()? * std::f64::consts::PI;
+    let given = json["cones"][0]["curvature"].as_f64();
+    if given.is_none_or(|k| (k - expected).abs() > 1e-9) {
+        return Err(format!("cones are {}", json["cones"]).into());
+    }
+    let splits_only = json["connectivity"]["hausdorff"].as_f64() == Some(0.0);
+    if !splits_only || max_error(&json) > 1e-10 {
+        return Err(format!("{} {}", json["connectivity"], json["metric"]).into());
+    }
+    verify(&atlas, Some(model), Some(1))
+}
+
+/// The two schemes that keep the lengths in space exactly must agree, and with an area distortion computed elsewhere.
+fn rocker_arm(corpus: &Path) -> Result<(), Failed> {
+    let model = corpus.join("rocker-arm.obj");
+    let mut distortion = Vec::new();
+    for scheme in ["vertex-scaling", "inversive-distance"] {
+        let setting = format!("flow.scheme={scheme}");
+        let (_built, atlas, json) = build_one(&model, &[&setting])?;
+        let figure = json["quality"]["area_distortion"].as_f64();
+        distortion.push(figure.unwrap_or(f64::NAN));
+        let rotation = |s: &serde_json::Value| s["gluing"]["rotation"].as_f64();
+        let segments = json["segments"].as_array().into_iter().flatten();
+        let turned = segments
+            .map(rotation)
+            .any(|r| r.is_none_or(|r| r.abs() > 1e-8));
+        if turned || json["periods"].as_array().map(Vec::len) != Some(2) {
+            return Err(format!("{scheme}: no translations or no two periods").into());
+        }
+        let iterations = json["metric"]["iterations"].as_u64();
+        if scheme == "vertex-scaling" && iterations.is_none_or(|n| n > 12) {
+            return Err(format!("{iterations:?} iterations").into());
+        }
+        verify(&atlas, Some(&model), Some(0))?;
+    }
+    let (exact, other) = (distortion[0], distortion[1]);
+    if (exact - 0.978).abs() > 0.002 || (exact - other).abs() > 0.001 {
+        return Err(format!("area distortions {distortion:?}").into());
+    }
+    Ok(())
+}
+
+fn quarter_turns(corpus: &Path) -> Result<(), Failed> {
+    let model = corpus.join("spot.obj");
+    let (_built, atlas, json) = build_one(&model, &[])?;
+    if json["flags"]["seamless"] != true {
+        return Err("8 cones of π/2 and not seamless".into());
+    }
+    verify(&atlas, Some(&model), Some(8))
+}
+
+/// Any file must end in atlases that pass, or in a refusal that says why; never in a panic.
+fn atlas_or_refusal(model: &Path) -> Result<(), Failed> {
+    let settings = ["flow.scheme=tangential", "pictures.enabled=false"];
+    let built = build(model, &settings)?;
+    let said = text(&built.output.stderr) + &text(&built.output.stdout);
+    let atlases = built.atlases();
+    match built.output.status.code() {
+        Some(0) if !atlases.is_empty() => {}
+        Some(1) if !said.contains("panic") && !said.trim().is_empty() => {}
+        code => {
+            let count = atlases.len();
+            return Err(format!("exit {code:?} with {count} atlases: {said}").into());
+        }
+    }
+    let mut checked = atlases.iter();
+    checked.try_for_each(|atlas| verify(atlas, None, None))
+}

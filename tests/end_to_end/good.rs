@@ -1,0 +1,96 @@
+//! Every good fixture becomes an atlas that passes, the same bytes for any number of threads.
+
+use crate::command::{build_into, document, verify};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Bytes of every file of a folder, by name.
+pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).expect("a folder").flatten() {
+        let name = entry.file_name().into_string().expect("UTF-8");
+        if entry.path().is_dir() {
+            let inner = self::files(&entry.path()).into_iter();
+            files.extend(inner.map(|(file, bytes)| (format!("{name}/{file}"), bytes)));
+        } else {
+            files.insert(name, std::fs::read(entry.path()).expect("readable"));
+        }
+    }
+    files
+}
+
+fn one_and_two_threads(fixture: &str, genus: u64, loops: u64, cones: usize) {
+    let mesh = format!("fixtures/good/{fixture}");
+    let run = |threads: &str| {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let threads = format!("run.threads={threads}");
+        let settings = ["pictures.enabled=true", "pictures.size=64", &threads];
+        let output = build_into(folder.path(), Path::new(&mesh), &settings);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{said}");
+        folder
+    };
+    let (one, two) = (run("1"), run("2"));
+    let name = fixture.split('.').next().expect("a name");
+    let atlas = one.path().join(name);
+    verify(&atlas);
+    let document = document(&atlas);
+    assert_eq!(document["topology"]["genus"], genus);
+    assert_eq!(document["topology"]["boundary_loops"], loops);
+    assert_eq!(document["cones"].as_array().map(Vec::len), Some(cones));
+
+    let (first, second) = (files(&atlas), files(&two.path().join(name)));
+    assert!(first.keys().eq(second.keys()));
+    for (file, bytes) in &first {
+        assert!(bytes == &second[file], "{file} depends on the threads");
+        assert!(!bytes.is_empty(), "{file} is empty");
+    }
+    for file in ["atlas.json", "atlas.npz", "surface.glb", "images/0000.exr"] {
+        assert!(first.contains_key(file), "{file} is missing");
+    }
+    for picture in ["preview", "layout", "log-scale", "convergence"] {
+        assert!(first.contains_key(&format!("{picture}.png")), "{picture}");
+    }
+}
+
+#[test]
+fn genus_0_animal() {
+    one_and_two_threads("genus-0-animal.ply", 0, 0, 8);
+}
+
+#[test]
+fn genus_0_cube() {
+    one_and_two_threads("genus-0-cube.obj", 0, 0, 8);
+}
+
+#[test]
+fn genus_1_mug() {
+    one_and_two_threads("genus-1-mug.off", 1, 0, 0);
+}
+
+#[test]
+fn genus_2_amphora() {
+    one_and_two_threads("genus-2-amphora.glb", 2, 0, 2);
+}
+
+#[test]
+fn genus_3_pretzel() {
+    one_and_two_threads("genus-3-pretzel.obj", 3, 0, 4);
+}
+
+#[test]
+fn disk_mask() {
+    one_and_two_threads("disk-mask.obj", 0, 1, 0);
+}
+
+#[test]
+fn three_boundaries_rabbit() {
+    one_and_two_threads("three-boundaries-rabbit.ply", 0, 3, 0);
+}
+
+/// The list above is complete.
+#[test]
+fn no_good_fixture_is_left_out() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/good");
+    assert_eq!(std::fs::read_dir(folder).expect("committed").count(), 7);
+}

@@ -1,0 +1,12 @@
+//! The whole program on the committed fixtures, as a user runs it.
+
+mod arrays;
+mod boundaries;
+mod command;
+mod flows;
+mod good;
+#[cfg(unix)]
+mod interrupt;
+mod prescriptions;
+mod refusals;
+mod replacing;
