@@ -292,6 +292,7 @@ mod tests {
             .collect();
         let length: EdgeVec<f64> = lengths(mesh);
         let metric = FlatMetric {
+            intrinsic: None,
             log_scale: vec![0.0; c.vertex_count()].into(),
             curvature: target.clone(),
             length: length.clone(),

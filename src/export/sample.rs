@@ -246,6 +246,7 @@ impl Grid {
             },
             flow: FlowParams::default(),
             metric: FlatMetric {
+                intrinsic: None,
                 log_scale: (0..vertices).map(|v| 0.1 * v as f64 - 1.0).collect(),
                 length,
                 curvature: VertexVec::filled(0.0, vertices),

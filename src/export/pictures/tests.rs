@@ -117,6 +117,7 @@ fn torus(n: u32, m: u32, k: f64) -> AffineAtlas {
         },
         flow: FlowParams::default(),
         metric: FlatMetric {
+            intrinsic: None,
             log_scale: positions.iter().map(|p| p[0]).collect(),
             length,
             curvature: VertexVec::filled(0.0, vertices),

@@ -26,6 +26,7 @@ pub use error::FlowError;
 
 use crate::flow::cones::{BoundaryCondition, Prescription};
 use crate::flow::feasibility::{self, Constraint};
+use crate::flow::intrinsic::Intrinsic;
 use crate::flow::metric::{self, Evaluation, Metric, full_angles};
 use crate::flow::schemes::{ConformalStructure, Law};
 use crate::geometry::connectivity::Connectivity;
@@ -66,8 +67,11 @@ pub struct PackingFit {
 pub struct FlatMetric {
     /// `u` for vertex scaling, `u − ln γ⁰` for packings, so that the lengths below follow from it and the scheme.
     pub log_scale: VertexVec<f64>,
-    /// Flat length of every edge, source units.
+    /// Flat length of every edge, source units: of the surface's own edges, or where there is `intrinsic`, of the edges
+    /// of `intrinsic.flat`.
     pub length: EdgeVec<f64>,
+    /// The triangulations that the flow with flips went through; `None` where the connectivity stayed.
+    pub intrinsic: Option<Box<Intrinsic>>,
     /// Curvature reached at every vertex, radians; also where the boundary is free.
     pub curvature: VertexVec<f64>,
     /// One entry an iteration.
@@ -426,6 +430,7 @@ fn finish(
     Ok(FlatMetric {
         log_scale,
         length,
+        intrinsic: None,
         curvature: evaluation.curvature,
         history,
         max_curvature_error,

@@ -5,8 +5,8 @@ use super::Connectivity;
 use crate::geometry::ids::{EdgeId, FaceId, HalfedgeId, NONE, VertexId};
 
 impl Connectivity {
-    /// Replaces edge `ab` between faces `abc` and `bad` by `dc`, and returns true; false, and nothing
-    /// done, on the boundary and where both sides are the same face.
+    /// Replaces edge `ab` between faces `abc` and `bad` by `dc`; `None`, and nothing done, on the
+    /// boundary and where both sides are the same face.
     ///
     /// ```text
     ///        c                   c
@@ -16,13 +16,11 @@ impl Connectivity {
     ///        d                   d
     /// ```
     /// The edge keeps its id; its halfedge in `f` now runs from `d` to `c`.
-    pub fn flip(&mut self, e: EdgeId) -> bool {
+    pub fn flip(&mut self, e: EdgeId) -> Option<Flip> {
         let h = self.edge_halfedge(e);
-        let Some(t) = self.twin(h) else {
-            return false;
-        };
+        let t = self.twin(h)?;
         if self.face(h) == self.face(t) {
-            return false;
+            return None;
         }
         let (hn, hp, tn, tp) = (self.next(h), self.prev(h), self.next(t), self.prev(t));
         let (a, b, c, d) = (self.tail(h), self.tail(t), self.tail(hp), self.tail(tp));
@@ -63,7 +61,7 @@ impl Connectivity {
                 moved(first)
             };
         }
-        true
+        Some(Flip { h, t, moves })
     }
 
     /// Puts a new vertex on an edge and joins it to the apex on each side. Returns the vertex
@@ -232,4 +230,16 @@ pub struct FaceSplit {
     pub vertex: VertexId,
     /// The three faces; in face `i` the new vertex stands at corner `(i + 2) % 3`, the others as before.
     pub faces: [FaceId; 3],
+}
+
+/// What [`Connectivity::flip`] did to the numbering of halfedges.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flip {
+    /// Halfedge of the edge in `f`: `a → b` before, `d → c` after.
+    pub h: HalfedgeId,
+    /// Its twin in `g`: `b → a` before, `c → d` after.
+    pub t: HalfedgeId,
+    /// Old and new id of the outer halfedges `c → a`, `a → d`, `d → b`, `b → c`, in this order. What is kept a
+    /// halfedge moves along; all four are read before any is written, since the ids are permuted.
+    pub moves: [(HalfedgeId, HalfedgeId); 4],
 }

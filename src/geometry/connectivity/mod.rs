@@ -24,7 +24,7 @@
 
 mod edit;
 
-pub use edit::{EdgeSplit, FaceSplit, HalvedFace};
+pub use edit::{EdgeSplit, FaceSplit, Flip, HalvedFace};
 
 use crate::geometry::ids::{
     EdgeId, EdgeVec, FaceId, HalfedgeId, HalfedgeVec, NONE, VertexId, VertexVec,
