@@ -45,3 +45,17 @@ impl Curves {
         self.first[base_edge.index()] as usize..self.first[base_edge.index() + 1] as usize
     }
 }
+impl Correspondence {
+    pub fn identity(base: &crate::geometry::connectivity::Connectivity) -> Self {
+        Self {
+            normal: EdgeVec::filled(-1, base.edge_count()),
+            roundabout: HalfedgeVec::filled(0, base.halfedge_count()),
+        }
+    }
+    pub fn flipped(
+        &mut self,
+        _after: &crate::geometry::connectivity::Connectivity,
+        _flip: &crate::geometry::connectivity::Flip,
+    ) {
+    }
+}

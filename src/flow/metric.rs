@@ -2,13 +2,14 @@
 //!
 //! *Enters:* connectivity, a [`ConformalStructure`], `u`. *Leaves:* per face angles and weights, per vertex curvature
 //! (3), (4), per edge the weights of the Hessian ∂K/∂u. *Guaranteed:* the same bytes for any number of threads: faces
-//! are independent, and every vertex sums its corners in the order of their halfedges.
+//! are independent, and every vertex sums its corners in the order of the faces.
 //!
 //! The Hessian needs no matrix here: with w_e the sum of [`FaceShape::weight`] over the faces of e,
 //! ∂K_i/∂u_j = −Σ w_e over the edges ij, ∂K_i/∂u_i = Σ w_e over the edges at i, because angles do not change when all
 //! of `u` does. So H is a weighted graph Laplacian, symmetric, with the constants in its kernel; semidefinite because the
 //! energy is convex, and for packings (Φ ∈ [0, π/2]) plainly so, since no weight is negative.
 
+use crate::flow::delaunay::Delaunay;
 use crate::flow::schemes::{ConformalStructure, FaceShape};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, HalfedgeId, VertexVec};
@@ -21,15 +22,17 @@ const PIECE: usize = 2048;
 
 /// Evaluates one structure at many `u`.
 pub struct Metric<'a> {
-    /// Which triangles.
-    pub connectivity: &'a Connectivity,
-    /// How `u` becomes lengths.
-    pub structure: &'a ConformalStructure,
-    /// Corners of every vertex, as halfedges, ascending; vertex v has `corner[first[v]..first[v + 1]]`.
-    first: Vec<u32>,
-    corner: Vec<HalfedgeId>,
+    surface: Surface<'a>,
     /// 2π at interior vertices, π on the boundary.
     full_angle: VertexVec<f64>,
+}
+
+/// What turns `u` into angles.
+enum Surface<'a> {
+    /// The connectivity stays.
+    Fixed(&'a Connectivity, &'a ConformalStructure),
+    /// Vertex scaling on the Delaunay triangulation at every `u`.
+    Flipping(Box<Delaunay>),
 }
 
 /// What [`Metric::evaluate`] finds at one `u`.
@@ -42,76 +45,100 @@ pub struct Evaluation {
 }
 
 impl<'a> Metric<'a> {
-    /// Prepares the sums.
+    /// A structure on a connectivity that stays.
     pub fn new(connectivity: &'a Connectivity, structure: &'a ConformalStructure) -> Self {
-        let n = connectivity.vertex_count();
-        let mut first = vec![0u32; n + 1];
-        for h in connectivity.halfedges() {
-            first[connectivity.tail(h).index() + 1] += 1;
-        }
-        for v in 0..n {
-            first[v + 1] += first[v];
-        }
-        let mut next = first.clone();
-        let mut corner = vec![HalfedgeId::new(0); connectivity.halfedge_count()];
-        for h in connectivity.halfedges() {
-            let slot = &mut next[connectivity.tail(h).index()];
-            corner[*slot as usize] = h;
-            *slot += 1;
-        }
         Self {
-            connectivity,
-            structure,
-            first,
-            corner,
+            surface: Surface::Fixed(connectivity, structure),
             full_angle: full_angles(connectivity),
         }
     }
 
-    /// Angles, weights and curvature at `u`; buffers in `out` are reused.
-    pub fn evaluate(&self, u: &VertexVec<f64>, out: &mut Evaluation) {
-        let (faces, vertices) = (self.connectivity.face_count(), u.len());
-        if out.shape.len() != faces || out.curvature.len() != vertices {
-            out.shape = FaceVec::filled(FaceShape::default(), faces);
-            out.curvature = VertexVec::filled(0.0, vertices);
+    /// Vertex scaling with flips.
+    pub fn flipping(delaunay: Delaunay) -> Self {
+        Self {
+            full_angle: full_angles(&delaunay.connectivity),
+            surface: Surface::Flipping(Box::new(delaunay)),
         }
-        out.shape
-            .as_mut_slice()
-            .par_iter_mut()
-            .with_min_len(PIECE)
-            .enumerate()
-            .for_each(|(f, shape)| {
-                *shape = self
-                    .structure
-                    .face_shape(self.connectivity, u, FaceId::new(f));
-            });
-        let shape = out.shape.as_slice();
-        out.curvature
-            .as_mut_slice()
-            .par_iter_mut()
-            .with_min_len(PIECE)
-            .enumerate()
-            .for_each(|(v, curvature)| {
-                let corners = &self.corner[self.first[v] as usize..self.first[v + 1] as usize];
-                let sum: f64 = corners
-                    .iter()
-                    .map(|h| shape[h.index() / 3].angle[h.index() % 3])
-                    .sum();
-                *curvature = self.full_angle.as_slice()[v] - sum;
-            });
+    }
+
+    /// The triangulation now.
+    pub fn connectivity(&self) -> &Connectivity {
+        match &self.surface {
+            Surface::Fixed(connectivity, _) => connectivity,
+            Surface::Flipping(delaunay) => &delaunay.connectivity,
+        }
+    }
+
+    /// Flips so far.
+    pub fn flips(&self) -> usize {
+        match &self.surface {
+            Surface::Fixed(..) => 0,
+            Surface::Flipping(delaunay) => delaunay.flips,
+        }
+    }
+
+    /// True where the triangulation is flipped.
+    pub fn may_flip(&self) -> bool {
+        matches!(self.surface, Surface::Flipping(_))
+    }
+
+    /// Where `u` starts.
+    pub fn start(&self) -> VertexVec<f64> {
+        match &self.surface {
+            Surface::Fixed(_, structure) => structure.start.clone(),
+            Surface::Flipping(delaunay) => {
+                VertexVec::filled(0.0, delaunay.connectivity.vertex_count())
+            }
+        }
+    }
+
+    /// The flipped triangulation, where there is one.
+    pub fn into_delaunay(self) -> Option<Delaunay> {
+        match self.surface {
+            Surface::Fixed(..) => None,
+            Surface::Flipping(delaunay) => Some(*delaunay),
+        }
+    }
+
+    /// Angles, weights and curvature at `u`; buffers in `out` are reused. Where the triangulation is flipped, it is the Delaunay
+    /// one at `u` from now on.
+    pub fn evaluate(&mut self, u: &VertexVec<f64>, out: &mut Evaluation) {
+        match &mut self.surface {
+            Surface::Fixed(connectivity, structure) => {
+                let faces = connectivity.face_count();
+                if out.shape.len() != faces {
+                    out.shape = FaceVec::filled(FaceShape::default(), faces);
+                }
+                let shapes = out.shape.as_mut_slice().par_iter_mut();
+                shapes
+                    .with_min_len(PIECE)
+                    .enumerate()
+                    .for_each(|(f, shape)| {
+                        *shape = structure.face_shape(connectivity, u, FaceId::new(f));
+                    });
+            }
+            Surface::Flipping(delaunay) => delaunay.evaluate(u, &mut out.shape),
+        }
+        out.curvature.clone_from(&self.full_angle);
+        let connectivity = self.connectivity();
+        for (f, shape) in out.shape.enumerate() {
+            for (v, angle) in connectivity.face_vertices(f).into_iter().zip(shape.angle) {
+                out.curvature[v] -= angle;
+            }
+        }
     }
 
     /// w_e of every edge, radians: minus the off-diagonal entries of the Hessian.
     pub fn edge_weights(&self, evaluation: &Evaluation) -> EdgeVec<f64> {
+        let connectivity = self.connectivity();
         // The halfedge 3f + k lies opposite corner k + 2.
-        let side = |h: HalfedgeId| {
-            evaluation.shape[self.connectivity.face(h)].weight[(h.index() % 3 + 2) % 3]
-        };
-        self.connectivity
+        let side =
+            |h: HalfedgeId| evaluation.shape[connectivity.face(h)].weight[(h.index() % 3 + 2) % 3];
+        connectivity
             .edges()
             .map(|e| {
-                let h = self.connectivity.edge_halfedge(e);
-                side(h) + self.connectivity.twin(h).map_or(0.0, side)
+                let h = connectivity.edge_halfedge(e);
+                side(h) + connectivity.twin(h).map_or(0.0, side)
             })
             .collect()
     }
@@ -119,9 +146,10 @@ impl<'a> Metric<'a> {
     /// Diagonal of the Hessian, radians, and below it the sum of the absolute values of the row's other
     /// entries. A loop moves no angle and counts in neither.
     pub fn diagonal(&self, weight: &EdgeVec<f64>) -> VertexVec<[f64; 2]> {
-        let mut diagonal = VertexVec::filled([0.0; 2], self.connectivity.vertex_count());
+        let connectivity = self.connectivity();
+        let mut diagonal = VertexVec::filled([0.0; 2], self.connectivity().vertex_count());
         for (e, &w) in weight.enumerate() {
-            let [i, j] = self.connectivity.edge_vertices(e);
+            let [i, j] = connectivity.edge_vertices(e);
             if i != j {
                 for v in [i, j] {
                     diagonal[v][0] += w;
@@ -138,9 +166,10 @@ impl<'a> Metric<'a> {
         weight: &EdgeVec<f64>,
         direction: &VertexVec<f64>,
     ) -> VertexVec<f64> {
+        let connectivity = self.connectivity();
         let mut result = VertexVec::filled(0.0, direction.len());
         for (e, &w) in weight.enumerate() {
-            let [i, j] = self.connectivity.edge_vertices(e);
+            let [i, j] = connectivity.edge_vertices(e);
             let flow = w * (direction[i] - direction[j]);
             result[i] += flow;
             result[j] -= flow;
@@ -235,7 +264,7 @@ mod tests {
         for shape in shapes::small() {
             for scheme in SCHEMES {
                 let (structure, u) = at_random(&shape, scheme);
-                let metric = Metric::new(&shape.connectivity, &structure);
+                let mut metric = Metric::new(&shape.connectivity, &structure);
                 let (mut now, mut up, mut down) = Default::default();
                 metric.evaluate(&u, &mut now);
                 assert!(now.broken_faces().is_empty());
@@ -272,7 +301,7 @@ mod tests {
         for shape in shapes::small() {
             for scheme in SCHEMES {
                 let (structure, u) = at_random(&shape, scheme);
-                let metric = Metric::new(&shape.connectivity, &structure);
+                let mut metric = Metric::new(&shape.connectivity, &structure);
                 let mut now = Evaluation::default();
                 metric.evaluate(&u, &mut now);
                 let weight = metric.edge_weights(&now);
@@ -299,7 +328,7 @@ mod tests {
             let chi = shape.connectivity.topology().euler_characteristic as f64;
             for scheme in SCHEMES {
                 let (structure, u) = at_random(&shape, scheme);
-                let metric = Metric::new(&shape.connectivity, &structure);
+                let mut metric = Metric::new(&shape.connectivity, &structure);
                 let mut now = Evaluation::default();
                 metric.evaluate(&u, &mut now);
                 let total: f64 = now.curvature.iter().sum();
@@ -333,8 +362,8 @@ mod tests {
     fn threads_do_not_change_a_bit() {
         let shape = shapes::torus(90, 70);
         let (structure, u) = at_random(&shape, Scheme::InversiveDistance);
-        let metric = Metric::new(&shape.connectivity, &structure);
-        let with = |threads: usize| {
+        let mut metric = Metric::new(&shape.connectivity, &structure);
+        let mut with = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new()
                 .num_threads(threads)
                 .build()

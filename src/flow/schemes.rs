@@ -56,7 +56,7 @@ pub struct FaceShape {
 
 impl FaceShape {
     /// The limit of a triangle whose longest side is opposite `corner`.
-    fn broken_at(corner: usize) -> Self {
+    pub(crate) fn broken_at(corner: usize) -> Self {
         let mut shape = FaceShape {
             broken: true,
             ..Default::default()

@@ -52,13 +52,22 @@ fn half_excesses(length: [f64; 3]) -> Option<(f64, [f64; 3], f64)> {
 ///
 /// tan²(θ₀/2) = (s − l₁)(s − l₂) / (s (s − l₀)).
 pub fn angles(length: [f64; 3]) -> Option<[f64; 3]> {
-    let (perimeter, excess, _) = half_excesses(length)?;
-    Some([0, 1, 2].map(|k| {
+    Some(corner_angles(half_excesses(length)?))
+}
+
+/// Both [`angles`] and [`cotangents`], which share most of their work.
+pub fn angles_and_cotangents(length: [f64; 3]) -> Option<([f64; 3], [f64; 3])> {
+    let halves = half_excesses(length)?;
+    Some((corner_angles(halves), corner_cotangents(halves)))
+}
+
+fn corner_angles((perimeter, excess, _): (f64, [f64; 3], f64)) -> [f64; 3] {
+    [0, 1, 2].map(|k| {
         let (j, m) = ((k + 1) % 3, (k + 2) % 3);
         2.0 * (excess[j] * excess[m])
             .sqrt()
             .atan2((perimeter * excess[k]).sqrt())
-    }))
+    })
 }
 
 /// Area, squared length unit (Heron); `None` where the lengths make no triangle.
@@ -73,12 +82,15 @@ pub fn area(length: [f64; 3]) -> Option<f64> {
 /// From half angles, cot θ = (1 − tan²(θ/2)) / (2 tan(θ/2)), that is
 /// cot θ₀ = (s(s − l₀) − (s − l₁)(s − l₂)) / (2A).
 pub fn cotangents(length: [f64; 3]) -> Option<[f64; 3]> {
-    let (perimeter, excess, _) = half_excesses(length)?;
+    Some(corner_cotangents(half_excesses(length)?))
+}
+
+fn corner_cotangents((perimeter, excess, _): (f64, [f64; 3], f64)) -> [f64; 3] {
     let root = (perimeter * excess[0] * excess[1] * excess[2]).sqrt();
-    Some([0, 1, 2].map(|k| {
+    [0, 1, 2].map(|k| {
         let (j, m) = ((k + 1) % 3, (k + 2) % 3);
         (perimeter * excess[k] - excess[j] * excess[m]) / (2.0 * root)
-    }))
+    })
 }
 
 /// `∂θ_i/∂l_j` at `[i][j]`, radians per length unit; `None` where the lengths make no triangle.

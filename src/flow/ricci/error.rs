@@ -4,6 +4,7 @@ use super::Scheme;
 use crate::flow::feasibility::Violation;
 use crate::flow::packing::PackingError;
 use crate::flow::solve::SolveError;
+use crate::geometry::connectivity::ConnectivityError;
 use crate::geometry::ids::{EdgeId, FaceId, VertexId};
 
 /// Why there is no flat metric.
@@ -91,6 +92,9 @@ pub enum FlowError {
         /// By how much a further step would still change the difference of two `u`; infinite where no step exists.
         change: f64,
     },
+    /// The double of the surface could not be made.
+    #[error(transparent)]
+    Double(#[from] ConnectivityError),
     /// The observer asked to stop.
     #[error("the flow was cancelled")]
     Cancelled,

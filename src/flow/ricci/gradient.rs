@@ -59,24 +59,24 @@ impl Record {
     }
 }
 
-pub(crate) fn minimise(problem: &Problem) -> Result<Solution, FlowError> {
+pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
     let params = problem.params;
-    let metric = &problem.metric;
-    let mut u = metric.structure.start.clone();
+    let mut u = problem.metric.start();
     let start_mean = mean(&u);
     let (mut now, mut trial) = (Evaluation::default(), Evaluation::default());
-    metric.evaluate(&u, &mut now);
+    problem.metric.evaluate(&u, &mut now);
     let mut line = FlowStep {
         max_error: problem.max_error(&now),
         ..FlowStep::default()
     };
+    let mut flips = problem.metric.flips();
     let mut record = Record {
         lines: vec![line],
         stride: 1,
     };
     problem.observer.flow_step(&line);
     let mut residual = problem.residual(&now);
-    let mut weight = metric.edge_weights(&now);
+    let mut weight = problem.metric.edge_weights(&now);
     // Time and error at the last multiple of the window, and the rate measured there.
     let (mut window, mut rate) = ((0.0, line.max_error), None);
     let mut cut = 1.0;
@@ -97,7 +97,8 @@ pub(crate) fn minimise(problem: &Problem) -> Result<Solution, FlowError> {
             }
             return Err(problem.not_converged(line.iteration, &now));
         }
-        let bound = metric
+        let bound = problem
+            .metric
             .diagonal(&weight)
             .enumerate()
             .filter(|(v, _)| problem.prescribed[*v])
@@ -116,7 +117,7 @@ pub(crate) fn minimise(problem: &Problem) -> Result<Solution, FlowError> {
                 let constant = start_mean - mean(&next);
                 shift(&mut next, constant);
             }
-            metric.evaluate(&next, &mut trial);
+            problem.metric.evaluate(&next, &mut trial);
             let next_residual = problem.residual(&trial);
             // At the floor of rounding the norm may rise a little without harm. NaN is no descent.
             let next_norm = dot(&next_residual, &next_residual);
@@ -131,15 +132,21 @@ pub(crate) fn minimise(problem: &Problem) -> Result<Solution, FlowError> {
             }
         };
         cut = (2.0 * cut).min(1.0);
-        let next_weight = metric.edge_weights(&trial);
+        let next_weight = problem.metric.edge_weights(&trial);
         let largest = residual.iter().map(|r| r.abs()).fold(0.0, f64::max);
-        line.energy += if epsilon * largest > LONG_STEP {
+        line.energy += if problem.metric.may_flip() {
+            // The old weights belong to a triangulation that may be gone.
+            -0.5 * epsilon * (norm + dot(&residual, &next_residual))
+        } else if epsilon * largest > LONG_STEP {
             problem.energy_change(&u, &residual, -epsilon, &mut now)
         } else {
             // ∫ (K − K̄) du along δ = −ε (K − K̄) by the corrected trapezoid, whose error is of fifth order in ε: ends of the
             // directional derivative, and of its own derivative δᵀHδ.
-            let bend = dot(&residual, &metric.apply_hessian(&weight, &residual))
-                - dot(&residual, &metric.apply_hessian(&next_weight, &residual));
+            let bend = dot(&residual, &problem.metric.apply_hessian(&weight, &residual))
+                - dot(
+                    &residual,
+                    &problem.metric.apply_hessian(&next_weight, &residual),
+                );
             -0.5 * epsilon * (norm + dot(&residual, &next_residual))
                 + epsilon * epsilon / 12.0 * bend
         };
@@ -151,6 +158,8 @@ pub(crate) fn minimise(problem: &Problem) -> Result<Solution, FlowError> {
         line.max_error = problem.max_error(&now);
         line.step = epsilon;
         line.flow_time += epsilon;
+        line.flips = problem.metric.flips() - flips;
+        flips = problem.metric.flips();
         record.push(line);
         problem.observer.flow_step(&line);
         if line.iteration.is_multiple_of(RATE_WINDOW) {

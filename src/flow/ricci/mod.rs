@@ -15,6 +15,7 @@
 pub mod error;
 #[cfg(test)]
 mod existence;
+mod flipping;
 pub mod gradient;
 pub mod newton;
 #[cfg(test)]
@@ -30,7 +31,7 @@ use crate::flow::intrinsic::Intrinsic;
 use crate::flow::metric::{self, Evaluation, Metric, full_angles};
 use crate::flow::schemes::{ConformalStructure, Law};
 use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{EdgeVec, FaceId, VertexVec};
+use crate::geometry::ids::{EdgeVec, FaceId, VertexId, VertexVec};
 use crate::observe::Observer;
 use std::f64::consts::PI;
 
@@ -116,6 +117,9 @@ pub struct FlowParams {
     /// lengths in space as well as circles can; `inversive-distance` and `vertex-scaling` keep them exactly, but may
     /// meet broken triangles.
     pub scheme: Scheme,
+    /// With `vertex-scaling`: flip edges so that the triangulation is Delaunay at every `u`. Then a flat metric exists for every
+    /// prescription that meets Gauss–Bonnet with positive cone angles, on every mesh. The other schemes never flip.
+    pub delaunay: bool,
     /// Minimiser. `newton` takes a handful of steps; `gradient` follows the flow itself, thousands of times slower on large meshes.
     pub solver: Solver,
     /// Bound on max |K − K̄|, radians; rounding reaches about 1e-14, so nothing below 1e-13 is sensible.
@@ -130,6 +134,7 @@ impl Default for FlowParams {
     fn default() -> Self {
         Self {
             scheme: Scheme::default(),
+            delaunay: true,
             solver: Solver::default(),
             curvature_tolerance: 1e-10,
             max_newton_steps: 200,
@@ -150,6 +155,8 @@ pub(crate) struct Problem<'a> {
     target: VertexVec<f64>,
     /// False where `u` stays (free boundary).
     prescribed: VertexVec<bool>,
+    /// Vertex with whose `u` that of a vertex moves: itself, or its mirror image in a double.
+    shares: VertexVec<VertexId>,
     /// True where adding a constant to `u` changes nothing.
     scale_free: bool,
     params: &'a FlowParams,
@@ -204,7 +211,7 @@ impl Problem<'_> {
     /// Change of energy along a straight step of `u`: ∫₀¹ Σ (K − K̄)(u + t s δ) s δ dt, by five Gauss–Legendre points on each
     /// piece that moves `u` by at most 1. `scratch` is overwritten.
     fn energy_change(
-        &self,
+        &mut self,
         u: &VertexVec<f64>,
         direction: &VertexVec<f64>,
         step: f64,
@@ -231,6 +238,13 @@ impl Problem<'_> {
             }
         }
         change
+    }
+
+    fn minimise(&mut self) -> Result<Solution, FlowError> {
+        match self.params.solver {
+            Solver::Newton => newton::minimise(self),
+            Solver::Gradient => gradient::minimise(self),
+        }
     }
 
     fn not_converged(&self, iterations: usize, evaluation: &Evaluation) -> FlowError {
@@ -287,7 +301,6 @@ pub fn flow(
     observer: &dyn Observer,
 ) -> Result<FlatMetric, FlowError> {
     check_input(connectivity, source_length, prescription)?;
-    let structure = ConformalStructure::new(params.scheme, connectivity, source_length)?;
     let free = prescription.boundary == BoundaryCondition::Free;
     let prescribed: VertexVec<bool> = connectivity
         .vertices()
@@ -307,6 +320,14 @@ pub fn flow(
         let share = (required - prescribed) / target.len().max(1) as f64;
         target.as_mut_slice().iter_mut().for_each(|k| *k += share);
     }
+    if params.scheme == Scheme::VertexScaling && params.delaunay {
+        let surface = flipping::Surface {
+            connectivity,
+            source_length,
+        };
+        return flipping::flow(surface, target, prescribed, params, observer);
+    }
+    let structure = ConformalStructure::new(params.scheme, connectivity, source_length)?;
     let phi: Option<EdgeVec<f64>> = match (params.scheme, &structure.law) {
         (Scheme::Thurston, Law::Packing(cos_phi)) => {
             Some(cos_phi.iter().map(|c| c.acos()).collect())
@@ -318,19 +339,23 @@ pub fn flow(
         let mut constraint = Constraint::new(connectivity, phi.as_ref(), &target, boundary, 1.0);
         feasibility::check(&mut constraint)?;
     }
-    let problem = Problem {
+    let mut problem = Problem {
         metric: Metric::new(connectivity, &structure),
         target,
         prescribed,
+        shares: connectivity.vertices().collect(),
         scale_free,
         params,
         observer,
     };
-    let solution = match params.solver {
-        Solver::Newton => newton::minimise(&problem)?,
-        Solver::Gradient => gradient::minimise(&problem)?,
-    };
-    finish(&problem, source_length, &prescription.target, solution)
+    let solution = problem.minimise()?;
+    finish(
+        &problem,
+        &structure,
+        source_length,
+        &prescription.target,
+        solution,
+    )
 }
 
 /// 2πχ, radians.
@@ -389,6 +414,7 @@ fn check_input(
 /// Chooses the constant, computes the lengths, and checks them.
 fn finish(
     problem: &Problem,
+    structure: &ConformalStructure,
     source_length: &EdgeVec<f64>,
     target: &VertexVec<f64>,
     solution: Solution,
@@ -398,7 +424,7 @@ fn finish(
         evaluation,
         history,
     } = solution;
-    let (connectivity, structure) = (problem.metric.connectivity, problem.metric.structure);
+    let connectivity = problem.metric.connectivity();
     let iterations = history.last().map_or(0, |s| s.iteration);
     let mut max_curvature_error: f64 = 0.0;
     for (v, &k) in evaluation.curvature.enumerate() {

@@ -1,7 +1,11 @@
 //! Newton with a line search on the convex energy (tutorial 3.4).
 //!
 //! Each step solves (Hessian) δ = K̄ − K. Where a constant may be added to `u`, one vertex is left out of
-//! the system, which removes the kernel without spoiling sparsity; a free boundary is left out whole.
+//! the system, which removes the kernel without spoiling sparsity; a free boundary is left out whole. A vertex of a double and
+//! its mirror image are one unknown, so `u` is symmetric exactly.
+//!
+//! With flips every evaluation is on the Delaunay triangulation at its `u`; the energy is convex and twice continuously
+//! differentiable across flips, so nothing else changes. Flips of a rejected trial stay: the next trial undoes them where it must.
 //!
 //! A step of length s is taken when the directional derivative Σ (K − K̄) δ at its end is still ≤ 0, so the energy fell by
 //! convexity, *or* when ‖K − K̄‖₂ fell by a tenth. Insisting on the sign alone halves every step near
@@ -13,7 +17,7 @@
 use super::{FlowError, FlowStep, Problem, Solution, dot, moved};
 use crate::flow::metric::Evaluation;
 use crate::flow::solve::SymmetricSolver;
-use crate::geometry::ids::{EdgeId, EdgeVec, VertexId, VertexVec};
+use crate::geometry::ids::{EdgeId, EdgeVec, NONE, VertexId, VertexVec};
 
 /// Largest change of `u` tried in one step: e^20 in scale. Beyond it the quadratic model means nothing.
 const LARGEST_CHANGE: f64 = 20.0;
@@ -23,6 +27,9 @@ const LARGEST_RANGE: f64 = 600.0;
 const SMALLEST_STEP: f64 = 1e-10;
 /// Largest number of steps after the tolerance is met.
 const POLISHING_STEPS: usize = 8;
+/// Where no step lowers the error any more, rounding is the limit, and an error up to this is accepted, radians: the achieved
+/// one is in the record and in the report.
+pub(super) const FLOAT64_FLOOR: f64 = 1e-9;
 /// Largest difference in what a step would still add to `u` at the end. A packing that (6) rules out by equality has curvatures
 /// that reach the target only as `u` runs away, one unit a Newton step, until rounding takes it for converged.
 const REMAINING_CHANGE: f64 = 0.1;
@@ -30,88 +37,107 @@ const REMAINING_CHANGE: f64 = 0.1;
 /// the others are for Hessians that are only semidefinite, or nearly so (all faces of a vertex broken).
 const SHIFTS: [f64; 7] = [0.0, 1e-14, 1e-11, 1e-8, 1e-5, 1e-3, 1e-1];
 
-/// The Newton system with its fixed pattern.
+/// The Newton system on one pattern.
 struct System {
     solver: SymmetricSolver,
-    /// Vertices that are unknowns.
-    unknown: Vec<VertexId>,
-    /// Edges between unknowns, one a pair.
+    /// Number of the unknown of a vertex, `NONE` where `u` stays.
+    unknown: VertexVec<u32>,
+    unknowns: usize,
+    /// Edges between two unknowns.
     edge: Vec<EdgeId>,
+    /// Number of flips at which the pattern was taken.
+    flips: usize,
+}
+
+/// Diagonal and off-diagonal entries of the Hessian by unknowns, and the largest sum of absolute values in a row.
+struct Hessian {
+    diagonal: Vec<f64>,
+    off_diagonal: Vec<f64>,
+    largest: f64,
 }
 
 impl System {
+    /// Orders the unknowns of the triangulation as it is now. Vertices that share their `u` are one unknown.
     fn new(problem: &Problem) -> Result<Self, FlowError> {
-        let connectivity = problem.metric.connectivity;
-        let mut unknown: Vec<VertexId> = connectivity
+        let connectivity = problem.metric.connectivity();
+        let mut own: Vec<VertexId> = connectivity
             .vertices()
-            .filter(|&v| problem.prescribed[v])
+            .filter(|&v| problem.prescribed[v] && problem.shares[v] == v)
             .collect();
         if problem.scale_free {
-            unknown.pop();
+            own.pop();
         }
-        let mut index = VertexVec::filled(None, connectivity.vertex_count());
-        for (i, &v) in unknown.iter().enumerate() {
-            index[v] = Some(i as u32);
+        let mut unknown = VertexVec::filled(NONE, connectivity.vertex_count());
+        for (i, &v) in own.iter().enumerate() {
+            unknown[v] = i as u32;
+        }
+        for v in connectivity.vertices() {
+            unknown[v] = unknown[problem.shares[v]];
         }
         let (mut edge, mut pairs) = (Vec::new(), Vec::new());
         for e in connectivity.edges() {
-            let [i, j] = connectivity.edge_vertices(e).map(|v| index[v]);
-            if let (Some(i), Some(j)) = (i, j)
-                && i != j
-            {
+            let [i, j] = connectivity.edge_vertices(e).map(|v| unknown[v]);
+            if i != NONE && j != NONE && i != j {
                 edge.push(e);
                 pairs.push([i, j]);
             }
         }
         Ok(Self {
-            solver: SymmetricSolver::new(unknown.len(), &pairs)?,
+            solver: SymmetricSolver::new(own.len(), &pairs)?,
+            unknowns: own.len(),
             unknown,
             edge,
+            flips: problem.metric.flips(),
         })
     }
 
-    /// Sets the Hessian with `shift` (relative to its largest row) on the diagonal, and solves H δ = −residual; δ is 0 at
-    /// vertices that are no unknowns. `None` where the matrix is not positive definite.
+    /// The entries for the weights of all edges.
+    fn assemble(&self, problem: &Problem, weight: &EdgeVec<f64>) -> Hessian {
+        let connectivity = problem.metric.connectivity();
+        let mut diagonal = vec![0.0; self.unknowns];
+        let mut row = vec![0.0; self.unknowns];
+        for (e, &w) in weight.enumerate() {
+            let [i, j] = connectivity.edge_vertices(e).map(|v| self.unknown[v]);
+            // An edge within one unknown (a loop, or from a vertex to its mirror image) moves no angle.
+            if i != j {
+                for i in [i, j].into_iter().filter(|&i| i != NONE) {
+                    diagonal[i as usize] += w;
+                    row[i as usize] += 2.0 * w.abs();
+                }
+            }
+        }
+        Hessian {
+            diagonal,
+            off_diagonal: self.edge.iter().map(|&e| -weight[e]).collect(),
+            largest: row.into_iter().fold(f64::MIN_POSITIVE, f64::max),
+        }
+    }
+
+    /// Solves H δ = −residual with `shift` (relative to the largest row) on the diagonal; δ is 0 at vertices that are no
+    /// unknowns. `None` where the matrix is not positive definite.
     fn direction(
         &mut self,
         hessian: &Hessian,
         shift: f64,
         residual: &VertexVec<f64>,
     ) -> Option<VertexVec<f64>> {
-        let off_diagonal: Vec<f64> = self.edge.iter().map(|&e| -hessian.weight[e]).collect();
-        let diagonal: Vec<f64> = self
-            .unknown
+        let shifted = hessian
+            .diagonal
             .iter()
-            .map(|&v| hessian.row[v][0] + shift * hessian.largest)
-            .collect();
-        self.solver.factorize(&diagonal, &off_diagonal).ok()?;
-        let mut rhs: Vec<f64> = self.unknown.iter().map(|&v| -residual[v]).collect();
+            .map(|d| d + shift * hessian.largest)
+            .collect::<Vec<_>>();
+        self.solver
+            .factorize(&shifted, &hessian.off_diagonal)
+            .ok()?;
+        let mut rhs = vec![0.0; self.unknowns];
+        for (v, r) in residual.enumerate() {
+            if self.unknown[v] != NONE {
+                rhs[self.unknown[v] as usize] -= r;
+            }
+        }
         self.solver.solve(&mut rhs);
-        let mut direction = VertexVec::filled(0.0, residual.len());
-        for (&v, x) in self.unknown.iter().zip(rhs) {
-            direction[v] = x;
-        }
-        Some(direction)
-    }
-}
-
-/// Weights of the edges, diagonal and absolute row sums, and the largest of these.
-struct Hessian {
-    weight: EdgeVec<f64>,
-    row: VertexVec<[f64; 2]>,
-    largest: f64,
-}
-
-impl Hessian {
-    fn new(problem: &Problem, evaluation: &Evaluation) -> Self {
-        let weight = problem.metric.edge_weights(evaluation);
-        let row = problem.metric.diagonal(&weight);
-        let largest = row.iter().map(|r| r[1]).fold(f64::MIN_POSITIVE, f64::max);
-        Self {
-            weight,
-            row,
-            largest,
-        }
+        let at = |&i: &u32| rhs.get(i as usize).copied().unwrap_or(0.0);
+        Some(self.unknown.iter().map(at).collect())
     }
 }
 
@@ -124,14 +150,17 @@ pub(super) fn spread(values: &VertexVec<f64>) -> f64 {
     high - low
 }
 
-pub(crate) fn minimise(problem: &Problem) -> Result<Solution, FlowError> {
+pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
     let params = problem.params;
-    let mut system = System::new(problem)?;
-    let mut u = problem.metric.structure.start.clone();
+    let mut u = problem.metric.start();
     let (mut now, mut trial) = (Evaluation::default(), Evaluation::default());
     problem.metric.evaluate(&u, &mut now);
+    let mut system = System::new(problem)?;
+    let mut weight = problem.metric.edge_weights(&now);
+    let mut residual = problem.residual(&now);
     let mut record = FlowStep {
         max_error: problem.max_error(&now),
+        flips: problem.metric.flips(),
         ..FlowStep::default()
     };
     let mut history = vec![record];
@@ -150,8 +179,11 @@ pub(crate) fn minimise(problem: &Problem) -> Result<Solution, FlowError> {
         if !converged && exhausted {
             return Err(problem.not_converged(record.iteration, &now));
         }
-        let residual = problem.residual(&now);
-        let hessian = Hessian::new(problem, &now);
+        // A stale order lets the factor fill up many times over, so every new pattern is ordered anew.
+        if system.flips != problem.metric.flips() {
+            system = System::new(problem)?;
+        }
+        let hessian = system.assemble(problem, &weight);
         let taken = if converged {
             polished += 1;
             let direction = SHIFTS[..3]
@@ -160,9 +192,8 @@ pub(crate) fn minimise(problem: &Problem) -> Result<Solution, FlowError> {
             remaining = direction.as_ref().map_or(f64::INFINITY, spread);
             direction
                 .filter(|direction| {
-                    problem
-                        .metric
-                        .evaluate(&moved(&u, direction, 1.0), &mut trial);
+                    let next = moved(&u, direction, 1.0);
+                    problem.metric.evaluate(&next, &mut trial);
                     problem.max_error(&trial) < 0.5 * record.max_error
                 })
                 .map(|direction| (direction, 1.0))
@@ -174,19 +205,36 @@ pub(crate) fn minimise(problem: &Problem) -> Result<Solution, FlowError> {
             })
         };
         let Some((direction, step)) = taken else {
-            if converged {
+            if converged || record.max_error <= FLOAT64_FLOOR {
+                // The last trial may have flipped edges: `now` is measured anew on them.
+                problem.metric.evaluate(&u, &mut now);
                 break;
             }
             return Err(problem.not_converged(record.iteration, &now));
         };
-        // `now` is the scratch of the quadrature: it is replaced right after.
-        record.energy += problem.energy_change(&u, &direction, step, &mut now);
+        weight = problem.metric.edge_weights(&trial);
+        let next_residual = problem.residual(&trial);
+        record.energy += if problem.metric.may_flip() {
+            // ∫ (K − K̄) du by the corrected trapezoid: the directional derivative at both ends, and its own derivative δᵀHδ,
+            // which is minus the directional derivative at the start because δ solves the system.
+            let (slope, next_slope) = (dot(&residual, &direction), dot(&next_residual, &direction));
+            let next_bend = dot(
+                &direction,
+                &problem.metric.apply_hessian(&weight, &direction),
+            );
+            0.5 * step * (slope + next_slope) - step * step / 12.0 * (slope + next_bend)
+        } else {
+            // `now` is the scratch of the quadrature: it is replaced right after.
+            problem.energy_change(&u, &direction, step, &mut now)
+        };
         u = moved(&u, &direction, step);
         std::mem::swap(&mut now, &mut trial);
+        residual = next_residual;
         record.iteration += 1;
         record.max_error = problem.max_error(&now);
         record.step = step;
         record.flow_time = record.iteration as f64;
+        record.flips = problem.metric.flips() - history.iter().map(|s| s.flips).sum::<usize>();
         history.push(record);
         problem.observer.flow_step(&record);
     }
@@ -205,7 +253,7 @@ pub(crate) fn minimise(problem: &Problem) -> Result<Solution, FlowError> {
 
 /// The first of 1, ½, ¼ … that is accepted (see the module docs), with its evaluation in `trial`.
 fn line_search(
-    problem: &Problem,
+    problem: &mut Problem,
     u: &VertexVec<f64>,
     direction: &VertexVec<f64>,
     residual: &VertexVec<f64>,

@@ -21,6 +21,7 @@ fn run_with(
     let params = FlowParams {
         scheme,
         solver,
+        delaunay: false,
         ..FlowParams::default()
     };
     flow(

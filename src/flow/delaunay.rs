@@ -1,0 +1,254 @@
+//! The triangulation that is flipped until it is Delaunay, at any scale `u` (method 2, "Flips").
+//!
+//! *Enters:* a closed triangulation with lengths, then one `u` after another. *Leaves:* the Delaunay triangulation of the lengths
+//! e^{(u_i + u_j)/2} l⁰, with the shapes of its faces. Lengths are logarithms at u = 0 (Penner coordinates): flips by Ptolemy's
+//! theorem commute with scaling, so they never change with `u`, and face shapes are computed after a face's own scale is
+//! divided out, so no scale overflows.
+//!
+//! *Guaranteed:* it ends, whatever the rounding; where it ends with every edge Delaunay, every face is a triangle (Gu, Luo, Sun, Wu 2018).
+//! A flip is never undone when `u` goes back. *Not guaranteed:* which of the diagonals of a cocircular quad is chosen.
+//!
+//! The test uses lengths only: the edge ij with opposite corners k, m is Delaunay iff cos θ_k + cos θ_m ≥ 0, where a
+//! cosine is (l_ik² + l_jk² − l_ij²) / (2 l_ik l_jk) even where the three lengths make no triangle. Where they do, the same
+//! is decided by θ_k + θ_m ≤ π from angles that keep their digits in needles.
+
+use crate::flow::correspondence::Correspondence;
+use crate::flow::schemes::FaceShape;
+use crate::geometry::connectivity::{Connectivity, Flip};
+use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, FaceVec, HalfedgeId, VertexVec};
+use crate::geometry::triangle;
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// By how much θ_k + θ_m may exceed π (or cos θ_k + cos θ_m fall below 0) before an edge is flipped, radians: above the
+/// rounding of angles, far below what a step of the flow could feel.
+const SLACK: f64 = 1e-12;
+/// Factor on the slack for every time that the edge was flipped already at this `u`: rounding may make both
+/// diagonals of a nearly cocircular quad look wrong, and this ends the quarrel.
+const SLACK_GROWTH: f64 = 4.0;
+/// Below this many items a piece is not worth another thread.
+const PIECE: usize = 4096;
+
+/// A triangulation with Penner coordinates.
+#[derive(Clone, Debug)]
+pub struct Delaunay {
+    /// The triangulation now.
+    pub connectivity: Connectivity,
+    /// ln of every edge's length at u = 0.
+    pub log_length: EdgeVec<f64>,
+    /// Told of every flip.
+    pub correspondences: Vec<Correspondence>,
+    /// Flips so far.
+    pub flips: usize,
+    /// How often every edge was flipped at this `u`; all zero between evaluations.
+    tired: EdgeVec<u8>,
+}
+
+/// How a flip finds the length of the new diagonal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Diagonal {
+    /// l_km = (l_ik l_jm + l_im l_jk) / l_ij: keeps the conformal class.
+    Ptolemy,
+    /// The distance in the plane where both faces are laid out: keeps the surface.
+    Euclid,
+}
+
+impl Delaunay {
+    /// Starts with `length` (one an edge, positive and finite) and no flip done.
+    pub fn new(
+        connectivity: Connectivity,
+        length: &EdgeVec<f64>,
+        correspondences: Vec<Correspondence>,
+    ) -> Self {
+        Self {
+            log_length: length.iter().map(|l| l.ln()).collect(),
+            tired: EdgeVec::filled(0, connectivity.edge_count()),
+            connectivity,
+            correspondences,
+            flips: 0,
+        }
+    }
+
+    /// Flips to the intrinsic Delaunay triangulation of the surface itself: from A to B. The surface stays the same. An edge whose
+    /// other diagonal has no positive length (a face that is folded onto another) stays.
+    pub fn flip_in_the_surface(&mut self) {
+        let u = VertexVec::filled(0.0, self.connectivity.vertex_count());
+        let mut shape = FaceVec::default();
+        self.update_shapes(&u, &mut shape);
+        self.flip_all(&u, &mut shape, Diagonal::Euclid);
+    }
+
+    /// Flips to the Delaunay triangulation at `u` by Ptolemy's theorem, and leaves the shapes of all faces in `shape`, whose
+    /// buffer is reused.
+    pub fn evaluate(&mut self, u: &VertexVec<f64>, shape: &mut FaceVec<FaceShape>) {
+        self.update_shapes(u, shape);
+        self.flip_all(u, shape, Diagonal::Ptolemy);
+    }
+
+    /// ln of the length of every edge at `u`.
+    pub fn log_lengths(&self, u: &VertexVec<f64>) -> EdgeVec<f64> {
+        let length = |(e, l): (EdgeId, &f64)| {
+            let [i, j] = self.connectivity.edge_vertices(e);
+            l + 0.5 * (u[i] + u[j])
+        };
+        self.log_length.enumerate().map(length).collect()
+    }
+
+    fn update_shapes(&self, u: &VertexVec<f64>, shape: &mut FaceVec<FaceShape>) {
+        if shape.len() != self.connectivity.face_count() {
+            *shape = FaceVec::filled(FaceShape::default(), self.connectivity.face_count());
+        }
+        let faces = shape.as_mut_slice().par_iter_mut().with_min_len(PIECE);
+        faces.enumerate().for_each(|(f, shape)| {
+            *shape = log_face(self.log_sides(u, FaceId::new(f)));
+        });
+    }
+
+    /// ln of the lengths of a face at `u`, `k` opposite corner `k`, less one number for the face: the sides' common
+    /// factor e^{(u_i + u_j + u_k)/2} changes no angle, and without it each side keeps its digits.
+    #[inline]
+    fn log_sides(&self, u: &VertexVec<f64>, face: FaceId) -> [f64; 3] {
+        let c = &self.connectivity;
+        let (edges, vertices) = (c.face_edges(face), c.face_vertices(face));
+        std::array::from_fn(|k| self.log_length[edges[k]] - 0.5 * u[vertices[k]])
+    }
+
+    fn flip_all(&mut self, u: &VertexVec<f64>, shape: &mut FaceVec<FaceShape>, diagonal: Diagonal) {
+        // Last in, first out: what a flip disturbs is looked at while it is in the cache.
+        let mut stack: Vec<EdgeId> = {
+            let wrong = |e: &EdgeId| self.is_wrong(u, shape, *e);
+            self.connectivity.edges().filter(wrong).collect()
+        };
+        stack.reverse();
+        let mut flipped = Vec::new();
+        while let Some(e) = stack.pop() {
+            if !self.is_wrong(u, shape, e) {
+                continue;
+            }
+            let Some(length) = self.diagonal(shape, e, diagonal) else {
+                continue;
+            };
+            let Some(flip) = self.connectivity.flip(e) else {
+                continue;
+            };
+            self.log_length[e] = length;
+            for correspondence in &mut self.correspondences {
+                correspondence.flipped(&self.connectivity, &flip);
+            }
+            self.flips += 1;
+            self.tired[e] = self.tired[e].saturating_add(1);
+            flipped.push(e);
+            self.look_around(u, shape, flip, &mut stack);
+        }
+        for e in flipped {
+            self.tired[e] = 0;
+        }
+    }
+
+    /// New shapes of the two faces, and their outer edges to look at again.
+    fn look_around(
+        &self,
+        u: &VertexVec<f64>,
+        shape: &mut FaceVec<FaceShape>,
+        flip: Flip,
+        stack: &mut Vec<EdgeId>,
+    ) {
+        let c = &self.connectivity;
+        for h in [flip.h, flip.t] {
+            let f = c.face(h);
+            shape[f] = log_face(self.log_sides(u, f));
+        }
+        stack.extend(flip.moves.map(|(_, to)| c.edge(to)));
+    }
+
+    fn is_wrong(&self, u: &VertexVec<f64>, shape: &FaceVec<FaceShape>, e: EdgeId) -> bool {
+        let c = &self.connectivity;
+        let h = c.edge_halfedge(e);
+        let Some(t) = c.twin(h) else {
+            return false;
+        };
+        let (f, g) = (c.face(h), c.face(t));
+        // A face glued to itself has both angles inside, so their sum is below π.
+        if f == g {
+            return false;
+        }
+        let slack = SLACK * SLACK_GROWTH.powi(i32::from(self.tired[e]));
+        if shape[f].broken || shape[g].broken {
+            let cosine = |h: HalfedgeId| {
+                let sides = self.log_sides(u, c.face(h));
+                cosine(sides, (c.corner(h) + 2) % 3)
+            };
+            cosine(h) + cosine(t) < -slack
+        } else {
+            let angle = |h: HalfedgeId| shape[c.face(h)].angle[(c.corner(h) + 2) % 3];
+            angle(h) + angle(t) > PI + slack
+        }
+    }
+
+    /// ln of the length at u = 0 of the other diagonal; `None` where it has none.
+    fn diagonal(&self, shape: &FaceVec<FaceShape>, e: EdgeId, rule: Diagonal) -> Option<f64> {
+        let c = &self.connectivity;
+        let h = c.edge_halfedge(e);
+        let t = c.twin(h)?;
+        // ab is the edge, c and d are opposite: next(h) = bc, prev(h) = ca, next(t) = ad, prev(t) = db.
+        let side = |h: HalfedgeId| self.log_length[c.edge(h)];
+        let (bc, ca, ad, db) = (
+            side(c.next(h)),
+            side(c.prev(h)),
+            side(c.next(t)),
+            side(c.prev(t)),
+        );
+        let length = match rule {
+            Diagonal::Ptolemy => log_sum(ca + db, ad + bc) - self.log_length[e],
+            Diagonal::Euclid => {
+                let angle = |h: HalfedgeId| shape[c.face(h)].angle[c.corner(h)];
+                // Around the end where both outer sides are shorter, so that little is subtracted.
+                let (p, q, theta) = if ca.max(ad) <= bc.max(db) {
+                    (ca, ad, angle(h) + angle(c.next(t)))
+                } else {
+                    (bc, db, angle(c.next(h)) + angle(t))
+                };
+                // (p − q)² + 4 p q sin²(θ/2), with the longer of p and q divided out.
+                let (long, ratio) = (p.max(q), (p.min(q) - p.max(q)).exp());
+                let gap = -(p.min(q) - p.max(q)).exp_m1();
+                let sine = (0.5 * theta).sin();
+                long + 0.5 * (gap * gap + 4.0 * ratio * sine * sine).ln()
+            }
+        };
+        length.is_finite().then_some(length)
+    }
+}
+
+/// ln(e^a + e^b).
+pub fn log_sum(a: f64, b: f64) -> f64 {
+    a.max(b) + (a.min(b) - a.max(b)).exp().ln_1p()
+}
+
+/// A face of vertex scaling from logarithms of its sides, `k` opposite corner `k`, up to one common summand; ∂θ_i/∂u_j = ½ cot θ_k.
+pub fn log_face(side: [f64; 3]) -> FaceShape {
+    let largest = side[0].max(side[1]).max(side[2]);
+    let length = side.map(|l| (l - largest).exp());
+    match triangle::angles_and_cotangents(length) {
+        Some((angle, cotangent)) => FaceShape {
+            angle,
+            weight: cotangent.map(|c| 0.5 * c),
+            broken: false,
+        },
+        None => {
+            let mut longest = 0;
+            for k in 1..3 {
+                if length[k] > length[longest] {
+                    longest = k;
+                }
+            }
+            FaceShape::broken_at(longest)
+        }
+    }
+}
+
+/// (a² + b² − c²) / (2 a b) at `corner`, from logarithms of the sides; also where they make no triangle.
+fn cosine(side: [f64; 3], corner: usize) -> f64 {
+    let (a, b) = (side[(corner + 1) % 3], side[(corner + 2) % 3]);
+    let ratio = (a - b).exp();
+    0.5 * (ratio + 1.0 / ratio) - 0.5 * (2.0 * side[corner] - a - b).exp()
+}

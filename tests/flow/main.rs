@@ -1,0 +1,68 @@
+//! The flow with flips: that it cannot fail, and that it finds what it should.
+//!
+//! `AFFINE_ATLAS_CORPUS` names a folder of real models; without it, cases that need one are reported as ignored.
+//! `AFFINE_ATLAS_CHECKER` names an independent checker; `reference_u.npz` beside it holds the u of an independent prototype.
+
+mod models;
+mod prescriptions;
+mod reference;
+
+use libtest_mimic::{Arguments, Failed, Trial};
+use std::path::PathBuf;
+
+/// The clean models.
+const MODELS: [&str; 18] = [
+    "spot.obj",
+    "bunny-closed.off",
+    "nefertiti.obj",
+    "fandisk.off",
+    "bumpy-cube.obj",
+    "rocker-arm.obj",
+    "kitten.obj",
+    "brezel.obj",
+    "three-holes.off",
+    "elephant-genus3.obj",
+    "fertility.off",
+    "face.obj",
+    "camelhead.off",
+    "lilium.obj",
+    "lego.ply",
+    "punctured-torus.obj",
+    "stanford-bunny.obj",
+    "beetle.obj",
+];
+
+fn main() {
+    let arguments = Arguments::from_args();
+    let folder = |name| std::env::var_os(name).map(PathBuf::from);
+    let corpus = folder("AFFINE_ATLAS_CORPUS");
+    let beside_checker = folder("AFFINE_ATLAS_CHECKER")
+        .and_then(|c| c.parent().map(|f| f.join("reference_u.npz")))
+        .filter(|f| f.is_file());
+    let mut trials = Vec::new();
+    for name in MODELS {
+        let file = corpus.as_ref().map(|c| c.join(name));
+        trials.push(trial(format!("prescriptions/{name}"), file, |file| {
+            prescriptions::converge(&file)
+        }));
+    }
+    let both = corpus.clone().zip(beside_checker);
+    trials.push(trial("reference".into(), both, |(corpus, file)| {
+        reference::agree(&corpus, &file)
+    }));
+    libtest_mimic::run(&arguments, trials).exit();
+}
+
+/// A case that is ignored where what it needs is not there.
+fn trial<T: Send + 'static>(
+    name: String,
+    needs: Option<T>,
+    run: impl FnOnce(T) -> Result<(), String> + Send + 'static,
+) -> Trial {
+    let ignored = needs.is_none();
+    let trial = Trial::test(name, move || match needs {
+        Some(needs) => run(needs).map_err(Failed::from),
+        None => Ok(()),
+    });
+    trial.with_ignored_flag(ignored)
+}
