@@ -11,6 +11,7 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::perm::PermRef;
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
@@ -55,24 +56,48 @@ impl SymmetricSolver {
     /// off-diagonal entries `pairs`, each named once for both triangles. A pair may occur several times (its
     /// values are added); a pair of equal indices adds to the diagonal.
     pub fn new(size: usize, pairs: &[[u32; 2]]) -> Result<Self, SolveError> {
+        Self::ordered(size, pairs, None)
+    }
+
+    /// The same for a pattern that differs little from this one: the order is kept, which saves most of the
+    /// analysis. Where much has changed the factor fills up many times over: then order anew.
+    pub fn with_pairs(&self, pairs: &[[u32; 2]]) -> Result<Self, SolveError> {
+        Self::ordered(self.size, pairs, self.symbolic.perm())
+    }
+
+    fn ordered(
+        size: usize,
+        pairs: &[[u32; 2]],
+        order: Option<PermRef<'_, u32>>,
+    ) -> Result<Self, SolveError> {
         let too_large = SolveError::TooLarge { unknowns: size };
         if size >= u32::MAX as usize / 2 || pairs.len() >= u32::MAX as usize / 2 {
             return Err(too_large);
         }
-        let mut order: Vec<u32> = (0..pairs.len() as u32).collect();
-        let entry = |p: u32| {
-            let [i, j] = pairs[p as usize];
-            (i.min(j), i.max(j))
-        };
-        order.sort_unstable_by_key(|&p| (entry(p), p));
+        // Pairs by column, in the order given, then each column by row.
+        let mut first = vec![0u32; size + 1];
+        for [i, j] in pairs {
+            first[*i.min(j) as usize + 1] += 1;
+        }
+        for c in 0..size {
+            first[c + 1] += first[c];
+        }
+        let mut next = first.clone();
+        let mut by_column = vec![[0u32; 2]; pairs.len()];
+        for (p, [i, j]) in pairs.iter().enumerate() {
+            let at = &mut next[*i.min(j) as usize];
+            by_column[*at as usize] = [*i.max(j), p as u32];
+            *at += 1;
+        }
         let (mut column, mut row) = (Vec::with_capacity(size + 1), Vec::new());
+        row.reserve(size + pairs.len());
         let mut slot = vec![0; pairs.len()];
-        let mut next = order.into_iter().peekable();
-        for c in 0..size as u32 {
+        for c in 0..size {
             column.push(row.len() as u32);
-            row.push(c);
-            while let Some(p) = next.next_if(|&p| entry(p).0 == c) {
-                let r = entry(p).1;
+            row.push(c as u32);
+            let entries = &mut by_column[first[c] as usize..first[c + 1] as usize];
+            entries.sort_unstable();
+            for &mut [r, p] in entries {
                 if row.last() != Some(&r) {
                     row.push(r);
                 }
@@ -85,9 +110,9 @@ impl SymmetricSolver {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
         };
-        let symbolic =
-            factorize_symbolic_cholesky(pattern, Side::Lower, SymmetricOrdering::Amd, params)
-                .map_err(|_| too_large)?;
+        let ordering = order.map_or(SymmetricOrdering::Amd, SymmetricOrdering::Custom);
+        let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, ordering, params)
+            .map_err(|_| too_large)?;
         let scratch = StackReq::or(
             symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default()),
             symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
@@ -238,11 +263,16 @@ mod tests {
                     diagonal[i] = dense[i][i];
                 }
                 let rhs: Vec<f64> = (0..n).map(|_| random() - 0.5).collect();
-                solver.factorize(&diagonal, &off).unwrap();
-                let mut x = rhs.clone();
-                solver.solve(&mut x);
-                for (a, b) in x.iter().zip(dense_solve(dense, rhs)) {
-                    assert!((a - b).abs() < 1e-11, "{a} against {b}");
+                let expected = dense_solve(dense, rhs.clone());
+                // With its own order, and with that of itself, which must come to the same.
+                let mut kept = solver.with_pairs(&pairs).unwrap();
+                for solver in [&mut solver, &mut kept] {
+                    solver.factorize(&diagonal, &off).unwrap();
+                    let mut x = rhs.clone();
+                    solver.solve(&mut x);
+                    for (a, b) in x.iter().zip(&expected) {
+                        assert!((a - b).abs() < 1e-11, "{a} against {b}");
+                    }
                 }
             }
         }

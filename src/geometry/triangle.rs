@@ -29,7 +29,11 @@ pub fn is_triangle(length: [f64; 3]) -> bool {
 fn half_excesses(length: [f64; 3]) -> Option<(f64, [f64; 3], f64)> {
     let mut order = [0usize, 1, 2];
     // Longest first; equal lengths keep their corner order, so the result is reproducible.
-    order.sort_by(|&i, &j| length[j].total_cmp(&length[i]));
+    for (i, j) in [(0, 1), (1, 2), (0, 1)] {
+        if length[order[j]] > length[order[i]] {
+            order.swap(i, j);
+        }
+    }
     let longest = length[order[0]];
     if !(length[order[2]] > 0.0 && longest.is_finite()) {
         return None;

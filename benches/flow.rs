@@ -1,0 +1,163 @@
+//! The flow with flips against the machine itself: whole Newton solve in units of one ordering, factorisation and solve of
+//! its final matrix.
+//!
+//! `cargo bench --bench flow -- [--levels N] MESH…`: each mesh and its N midpoint subdivisions. One thread; each figure the least of three.
+
+use affine_atlas::flow::cones::{BoundaryCondition, Prescription};
+use affine_atlas::flow::ricci::{self, FlatMetric, FlowParams, Scheme};
+use affine_atlas::flow::solve::SymmetricSolver;
+use affine_atlas::geometry::connectivity::Connectivity;
+use affine_atlas::geometry::ids::{EdgeId, EdgeVec, VertexId, VertexVec};
+use affine_atlas::{read, repair};
+use std::f64::consts::PI;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Runs of which the fastest counts.
+const RUNS: usize = 3;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build_global()?;
+    let mut levels = 0;
+    let mut meshes: Vec<PathBuf> = Vec::new();
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--levels" => levels = arguments.next().ok_or("--levels N")?.parse()?,
+            "--bench" => {}
+            _ => meshes.push(argument.into()),
+        }
+    }
+    for mesh in meshes {
+        let asset = read::read(&mesh, &Default::default())?;
+        let component = repair::repair(&asset.soup, &Default::default())?
+            .components
+            .swap_remove(0);
+        let component = component.mesh?;
+        let mut positions = component.positions.as_slice().to_vec();
+        let mut faces = component.connectivity.to_faces();
+        for level in 0..=levels {
+            if level > 0 {
+                (faces, positions) = subdivide(&faces, positions);
+            }
+            measure(
+                &format!("{} level {level}", mesh.display()),
+                &faces,
+                &positions,
+            )?;
+        }
+    }
+    Ok(())
+}
+
+/// Every face into four, new vertices at the middle of its edges; the surface stays.
+fn subdivide(faces: &[[u32; 3]], mut positions: Vec<[f64; 3]>) -> (Vec<[u32; 3]>, Vec<[f64; 3]>) {
+    let mut middle = std::collections::HashMap::new();
+    let mut fine = Vec::with_capacity(4 * faces.len());
+    for &[a, b, c] in faces {
+        let mut between = |i: u32, j: u32| {
+            *middle.entry((i.min(j), i.max(j))).or_insert_with(|| {
+                let (p, q) = (positions[i as usize], positions[j as usize]);
+                positions.push(std::array::from_fn(|k| 0.5 * (p[k] + q[k])));
+                positions.len() as u32 - 1
+            })
+        };
+        let (ab, bc, ca) = (between(a, b), between(b, c), between(c, a));
+        fine.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+    }
+    (fine, positions)
+}
+
+fn measure(
+    name: &str,
+    faces: &[[u32; 3]],
+    positions: &[[f64; 3]],
+) -> Result<(), Box<dyn std::error::Error>> {
+    let connectivity = Connectivity::from_faces(faces, positions.len())?;
+    let length: EdgeVec<f64> = connectivity
+        .edges()
+        .map(|e: EdgeId| {
+            let [a, b] = connectivity.edge_vertices(e).map(|v| positions[v.index()]);
+            (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()
+        })
+        .collect();
+    let prescription = eight_cones(&connectivity);
+    let params = FlowParams {
+        scheme: Scheme::VertexScaling,
+        ..FlowParams::default()
+    };
+    let mut best = f64::INFINITY;
+    let mut last = None;
+    for _ in 0..RUNS {
+        let start = Instant::now();
+        let flat = ricci::flow(&connectivity, &length, &prescription, &params, &())?;
+        best = best.min(start.elapsed().as_secs_f64());
+        last = Some(flat);
+    }
+    let Some(flat) = last else { return Ok(()) };
+    let solve = one_solve(&flat)?;
+    let steps = flat.history.last().map_or(0, |s| s.iteration);
+    let flips: Vec<usize> = flat.history.iter().map(|s| s.flips).collect();
+    println!(
+        "{name}: {} vertices, {best:.3} s, {steps} steps, flips {flips:?}, one order + factor + solve {solve:.3} s, ratio {:.2}, |K − K̄| {:.1e}",
+        connectivity.vertex_count(),
+        best / solve,
+        flat.max_curvature_error
+    );
+    Ok(())
+}
+
+/// Cones of 2πχ / 8 at eight vertices, far apart in the list.
+fn eight_cones(connectivity: &Connectivity) -> Prescription {
+    let total = 2.0 * PI * connectivity.topology().euler_characteristic as f64;
+    let mut target = VertexVec::filled(0.0, connectivity.vertex_count());
+    for i in 0..8 {
+        // The first vertices are those of the coarse mesh, whatever the subdivision.
+        target[VertexId::new(i * 500)] = total / 8.0;
+    }
+    Prescription::new(target, BoundaryCondition::Free)
+}
+
+/// Least seconds of ordering, factorising and solving once the Hessian at the end.
+fn one_solve(flat: &FlatMetric) -> Result<f64, Box<dyn std::error::Error>> {
+    let intrinsic = flat.intrinsic.as_ref().ok_or("no flips")?;
+    let c = &intrinsic.flat;
+    let n = c.vertex_count() - 1;
+    let mut diagonal = vec![0.0; n];
+    let (mut pairs, mut values) = (Vec::new(), Vec::new());
+    let cotangent = |h| {
+        let f = c.face(h);
+        let lengths = c.face_edges(f).map(|e| flat.length[e]);
+        let all = affine_atlas::geometry::triangle::cotangents(lengths);
+        all.map_or(0.0, |all| all[(c.corner(h) + 2) % 3])
+    };
+    for e in c.edges() {
+        let h = c.edge_halfedge(e);
+        let w = 0.5 * (cotangent(h) + c.twin(h).map_or(0.0, cotangent));
+        let [i, j] = c.edge_vertices(e).map(VertexId::index);
+        if i == j {
+            continue;
+        }
+        for v in [i, j] {
+            if v < n {
+                diagonal[v] += w;
+            }
+        }
+        if i < n && j < n {
+            pairs.push([i as u32, j as u32]);
+            values.push(-w);
+        }
+    }
+    let mut best = f64::INFINITY;
+    for _ in 0..RUNS {
+        let mut rhs = vec![1.0; n];
+        let start = Instant::now();
+        let mut solver = SymmetricSolver::new(n, &pairs)?;
+        solver.factorize(&diagonal, &values)?;
+        solver.solve(&mut rhs);
+        best = best.min(start.elapsed().as_secs_f64());
+    }
+    Ok(best)
+}
