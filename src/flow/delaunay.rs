@@ -1,9 +1,12 @@
 //! The triangulation that is flipped until it is Delaunay, at any scale `u` (method 2, "Flips").
 //!
 //! *Enters:* a closed triangulation with lengths, then one `u` after another. *Leaves:* the Delaunay triangulation of the lengths
-//! e^{(u_i + u_j)/2} l⁰, with the shapes of its faces. Lengths are logarithms at u = 0 (Penner coordinates): flips by Ptolemy's
-//! theorem commute with scaling, so they never change with `u`, and face shapes are computed after a face's own scale is
-//! divided out, so no scale overflows.
+//! e^{(u_i + u_j)/2} l⁰, with the shapes of its faces. Lengths are logarithms (Penner coordinates): flips by Ptolemy's
+//! theorem commute with scaling, and face shapes are computed after a face's own scale is divided out, so no scale overflows.
+//!
+//! A logarithm is the sum of two numbers, and [`Delaunay::rebase`] takes the `u` reached so far into it. In a face whose sides differ by
+//! a factor of 1e6, one unit in the last place of `u` or of a length turns an angle by 1e-10: a `u` near 10 could not be
+//! written down well enough to meet the tolerance. Relative to the last accepted step it can.
 //!
 //! *Guaranteed:* it ends, whatever the rounding; where it ends with every edge Delaunay, every face is a triangle (Gu, Luo, Sun, Wu 2018).
 //! A flip is never undone when `u` goes back. *Not guaranteed:* which of the diagonals of a cocircular quad is chosen.
@@ -34,8 +37,12 @@ const PIECE: usize = 4096;
 pub struct Delaunay {
     /// The triangulation now.
     pub connectivity: Connectivity,
-    /// ln of every edge's length at u = 0.
-    pub log_length: EdgeVec<f64>,
+    /// ln of every edge's length at `scale`, leading part.
+    high: EdgeVec<f64>,
+    /// What is left of it, below one unit in the last place of `high`.
+    low: EdgeVec<f64>,
+    /// The u that the lengths contain.
+    scale: VertexVec<f64>,
     /// Told of every flip.
     pub correspondences: Vec<Correspondence>,
     /// Flips so far.
@@ -61,7 +68,9 @@ impl Delaunay {
         correspondences: Vec<Correspondence>,
     ) -> Self {
         Self {
-            log_length: length.iter().map(|l| l.ln()).collect(),
+            high: length.iter().map(|l| l.ln()).collect(),
+            low: EdgeVec::filled(0.0, connectivity.edge_count()),
+            scale: VertexVec::filled(0.0, connectivity.vertex_count()),
             tired: EdgeVec::filled(0, connectivity.edge_count()),
             connectivity,
             correspondences,
@@ -78,20 +87,34 @@ impl Delaunay {
         self.flip_all(&u, &mut shape, Diagonal::Euclid);
     }
 
-    /// Flips to the Delaunay triangulation at `u` by Ptolemy's theorem, and leaves the shapes of all faces in `shape`, whose
+    /// Flips to the Delaunay triangulation at `u` (relative to [`scale`](Self::scale)) by Ptolemy's theorem, and leaves the shapes of all faces in `shape`, whose
     /// buffer is reused.
     pub fn evaluate(&mut self, u: &VertexVec<f64>, shape: &mut FaceVec<FaceShape>) {
         self.update_shapes(u, shape);
         self.flip_all(u, shape, Diagonal::Ptolemy);
     }
 
-    /// ln of the length of every edge at `u`.
-    pub fn log_lengths(&self, u: &VertexVec<f64>) -> EdgeVec<f64> {
-        let length = |(e, l): (EdgeId, &f64)| {
+    /// Takes `u` into the lengths: from now on it is counted from there.
+    pub fn rebase(&mut self, u: &VertexVec<f64>) {
+        for e in self.connectivity.edges() {
             let [i, j] = self.connectivity.edge_vertices(e);
-            l + 0.5 * (u[i] + u[j])
-        };
-        self.log_length.enumerate().map(length).collect()
+            let (sum, rest) = two_sum(self.high[e], 0.5 * (u[i] + u[j]));
+            (self.high[e], self.low[e]) = two_sum(sum, rest + self.low[e]);
+        }
+        for (v, u) in u.enumerate() {
+            self.scale[v] += u;
+        }
+    }
+
+    /// All of u that was taken into the lengths.
+    pub fn scale(&self) -> &VertexVec<f64> {
+        &self.scale
+    }
+
+    /// ln of the length of every edge with what was taken into it.
+    pub fn log_lengths(&self) -> EdgeVec<f64> {
+        let parts = self.high.iter().zip(self.low.iter());
+        parts.map(|(high, low)| high + low).collect()
     }
 
     fn update_shapes(&self, u: &VertexVec<f64>, shape: &mut FaceVec<FaceShape>) {
@@ -104,13 +127,31 @@ impl Delaunay {
         });
     }
 
-    /// ln of the lengths of a face at `u`, `k` opposite corner `k`, less one number for the face: the sides' common
-    /// factor e^{(u_i + u_j + u_k)/2} changes no angle, and without it each side keeps its digits.
+    /// ln of the sides of a face at `u`, `k` opposite corner `k`, relative to the longest side. The sides' common
+    /// factor e^{(u_i + u_j + u_k)/2} changes no angle.
     #[inline]
     fn log_sides(&self, u: &VertexVec<f64>, face: FaceId) -> [f64; 3] {
         let c = &self.connectivity;
-        let (edges, vertices) = (c.face_edges(face), c.face_vertices(face));
-        std::array::from_fn(|k| self.log_length[edges[k]] - 0.5 * u[vertices[k]])
+        let edges = c.face_edges(face);
+        let half: [f64; 3] = c.face_vertices(face).map(|v| 0.5 * u[v]);
+        let side: [f64; 3] = std::array::from_fn(|k| self.high[edges[k]] - half[k]);
+        let mut longest = 0;
+        for k in 1..3 {
+            if side[k] > side[longest] {
+                longest = k;
+            }
+        }
+        let mut log = std::array::from_fn(|k| {
+            let (gap, rest) = two_sum(self.high[edges[k]], -self.high[edges[longest]]);
+            let rest = rest + (self.low[edges[k]] - self.low[edges[longest]]);
+            (gap - (half[k] - half[longest])) + rest
+        });
+        // Rounding may have taken another side for the longest of two that are equal but for their last digits.
+        let most = log[0].max(log[1]).max(log[2]);
+        if most > 0.0 {
+            log = log.map(|l| l - most);
+        }
+        log
     }
 
     fn flip_all(&mut self, u: &VertexVec<f64>, shape: &mut FaceVec<FaceShape>, diagonal: Diagonal) {
@@ -131,7 +172,7 @@ impl Delaunay {
             let Some(flip) = self.connectivity.flip(e) else {
                 continue;
             };
-            self.log_length[e] = length;
+            (self.high[e], self.low[e]) = (length, 0.0);
             for correspondence in &mut self.correspondences {
                 correspondence.flipped(&self.connectivity, &flip);
             }
@@ -185,13 +226,13 @@ impl Delaunay {
         }
     }
 
-    /// ln of the length at u = 0 of the other diagonal; `None` where it has none.
+    /// ln of the length of the other diagonal; `None` where it has none.
     fn diagonal(&self, shape: &FaceVec<FaceShape>, e: EdgeId, rule: Diagonal) -> Option<f64> {
         let c = &self.connectivity;
         let h = c.edge_halfedge(e);
         let t = c.twin(h)?;
         // ab is the edge, c and d are opposite: next(h) = bc, prev(h) = ca, next(t) = ad, prev(t) = db.
-        let side = |h: HalfedgeId| self.log_length[c.edge(h)];
+        let side = |h: HalfedgeId| self.high[c.edge(h)] + self.low[c.edge(h)];
         let (bc, ca, ad, db) = (
             side(c.next(h)),
             side(c.prev(h)),
@@ -199,7 +240,7 @@ impl Delaunay {
             side(c.prev(t)),
         );
         let length = match rule {
-            Diagonal::Ptolemy => log_sum(ca + db, ad + bc) - self.log_length[e],
+            Diagonal::Ptolemy => log_sum(ca + db, ad + bc) - side(h),
             Diagonal::Euclid => {
                 let angle = |h: HalfedgeId| shape[c.face(h)].angle[c.corner(h)];
                 // Around the end where both outer sides are shorter, so that little is subtracted.
@@ -224,11 +265,9 @@ pub fn log_sum(a: f64, b: f64) -> f64 {
     a.max(b) + (a.min(b) - a.max(b)).exp().ln_1p()
 }
 
-/// A face of vertex scaling from logarithms of its sides, `k` opposite corner `k`, up to one common summand; ∂θ_i/∂u_j = ½ cot θ_k.
-pub fn log_face(side: [f64; 3]) -> FaceShape {
-    let largest = side[0].max(side[1]).max(side[2]);
-    let length = side.map(|l| (l - largest).exp());
-    match triangle::angles_and_cotangents(length) {
+/// A face of vertex scaling from logarithms of its sides, the greatest of which is 0; ∂θ_i/∂u_j = ½ cot θ_k.
+fn log_face(side: [f64; 3]) -> FaceShape {
+    match triangle::angles_and_cotangents_of_logs(side) {
         Some((angle, cotangent)) => FaceShape {
             angle,
             weight: cotangent.map(|c| 0.5 * c),
@@ -237,13 +276,20 @@ pub fn log_face(side: [f64; 3]) -> FaceShape {
         None => {
             let mut longest = 0;
             for k in 1..3 {
-                if length[k] > length[longest] {
+                if side[k] > side[longest] {
                     longest = k;
                 }
             }
             FaceShape::broken_at(longest)
         }
     }
+}
+
+/// The sum in float64 and what rounding left out of it, exactly (Knuth).
+fn two_sum(a: f64, b: f64) -> (f64, f64) {
+    let sum = a + b;
+    let part = sum - a;
+    (sum, (a - (sum - part)) + (b - part))
 }
 
 /// (a² + b² − c²) / (2 a b) at `corner`, from logarithms of the sides; also where they make no triangle.

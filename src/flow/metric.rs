@@ -92,6 +92,25 @@ impl<'a> Metric<'a> {
         }
     }
 
+    /// Says that `u` is where the flow has come to. Where lengths can take it in, `u` is 0 from now on and counted from there.
+    pub fn rebase(&mut self, u: &mut VertexVec<f64>) {
+        if let Surface::Flipping(delaunay) = &mut self.surface {
+            delaunay.rebase(u);
+            u.as_mut_slice().fill(0.0);
+        }
+    }
+
+    /// `u` with all that was taken into the lengths.
+    pub fn total(&self, u: &VertexVec<f64>) -> VertexVec<f64> {
+        match &self.surface {
+            Surface::Fixed(..) => u.clone(),
+            Surface::Flipping(delaunay) => {
+                let parts = delaunay.scale().iter().zip(u.iter());
+                parts.map(|(scale, u)| scale + u).collect()
+            }
+        }
+    }
+
     /// The flipped triangulation, where there is one.
     pub fn into_delaunay(self) -> Option<Delaunay> {
         match self.surface {

@@ -26,14 +26,10 @@ pub fn is_triangle(length: [f64; 3]) -> bool {
 }
 
 /// `(2s, 2(s − l₀), 2(s − l₁), 2(s − l₂))` after division by the longest side, and that side.
-fn half_excesses(length: [f64; 3]) -> Option<(f64, [f64; 3], f64)> {
-    let mut order = [0usize, 1, 2];
-    // Longest first; equal lengths keep their corner order, so the result is reproducible.
-    for (i, j) in [(0, 1), (1, 2), (0, 1)] {
-        if length[order[j]] > length[order[i]] {
-            order.swap(i, j);
-        }
-    }
+type Halves = (f64, [f64; 3], f64);
+
+fn half_excesses(length: [f64; 3]) -> Option<Halves> {
+    let order = longest_first(length);
     let longest = length[order[0]];
     if !(length[order[2]] > 0.0 && longest.is_finite()) {
         return None;
@@ -52,6 +48,35 @@ fn half_excesses(length: [f64; 3]) -> Option<(f64, [f64; 3], f64)> {
     (excess[order[0]] > 0.0).then_some((perimeter, excess, longest))
 }
 
+/// The same from logarithms of the sides, the longest of which is 1: the difference of the two longer sides keeps its digits
+/// however thin the triangle, since it never is a difference of lengths.
+fn half_excesses_of_logs(log: [f64; 3]) -> Option<Halves> {
+    let order = longest_first(log);
+    let (middle, shortest) = (log[order[1]].exp(), log[order[2]].exp());
+    let gap = -log[order[1]].exp_m1();
+    // A NaN must not pass for a triangle.
+    let least = shortest - gap;
+    if log[order[0]] != 0.0 || least.is_nan() || least <= 0.0 {
+        return None;
+    }
+    let mut excess = [0.0; 3];
+    excess[order[0]] = least;
+    excess[order[1]] = shortest + gap;
+    excess[order[2]] = middle + (1.0 - shortest);
+    Some((1.0 + (middle + shortest), excess, 1.0))
+}
+
+/// Corners, that opposite the longest side first; equal sides keep their order, so the result is reproducible.
+fn longest_first(side: [f64; 3]) -> [usize; 3] {
+    let mut order = [0usize, 1, 2];
+    for (i, j) in [(0, 1), (1, 2), (0, 1)] {
+        if side[order[j]] > side[order[i]] {
+            order.swap(i, j);
+        }
+    }
+    order
+}
+
 /// Corner angles, radians; `None` where the lengths make no triangle.
 ///
 /// tan²(θ₀/2) = (s − l₁)(s − l₂) / (s (s − l₀)).
@@ -59,13 +84,14 @@ pub fn angles(length: [f64; 3]) -> Option<[f64; 3]> {
     Some(corner_angles(half_excesses(length)?))
 }
 
-/// Both [`angles`] and [`cotangents`], which share most of their work.
-pub fn angles_and_cotangents(length: [f64; 3]) -> Option<([f64; 3], [f64; 3])> {
-    let halves = half_excesses(length)?;
+/// Both [`angles`] and [`cotangents`] from logarithms of the sides, the greatest of which must be 0; `None` where they make no
+/// triangle. Angles are as accurate as the logarithms, which may come from differences of much larger numbers.
+pub fn angles_and_cotangents_of_logs(log: [f64; 3]) -> Option<([f64; 3], [f64; 3])> {
+    let halves = half_excesses_of_logs(log)?;
     Some((corner_angles(halves), corner_cotangents(halves)))
 }
 
-fn corner_angles((perimeter, excess, _): (f64, [f64; 3], f64)) -> [f64; 3] {
+fn corner_angles((perimeter, excess, _): Halves) -> [f64; 3] {
     [0, 1, 2].map(|k| {
         let (j, m) = ((k + 1) % 3, (k + 2) % 3);
         2.0 * (excess[j] * excess[m])
@@ -89,7 +115,7 @@ pub fn cotangents(length: [f64; 3]) -> Option<[f64; 3]> {
     Some(corner_cotangents(half_excesses(length)?))
 }
 
-fn corner_cotangents((perimeter, excess, _): (f64, [f64; 3], f64)) -> [f64; 3] {
+fn corner_cotangents((perimeter, excess, _): Halves) -> [f64; 3] {
     let root = (perimeter * excess[0] * excess[1] * excess[2]).sqrt();
     [0, 1, 2].map(|k| {
         let (j, m) = ((k + 1) % 3, (k + 2) % 3);
@@ -124,6 +150,28 @@ mod tests {
 
     fn close(a: f64, b: f64, tolerance: f64) {
         assert!((a - b).abs() <= tolerance, "{a} against {b}");
+    }
+
+    #[test]
+    fn logarithms_agree_with_lengths_and_keep_digits_in_needles() {
+        for length in [[1.0, 0.7, 0.9], [0.2, 1.0, 0.95], [0.61, 0.62, 1.0]] {
+            let (angle, cotangent) = angles_and_cotangents_of_logs(length.map(f64::ln)).unwrap();
+            for k in 0..3 {
+                close(angle[k], angles(length).unwrap()[k], 1e-14);
+                close(cotangent[k], cotangents(length).unwrap()[k], 1e-13);
+            }
+        }
+        // Sides 1, e^{−d} and s with s² = d² + (2 sin(φ/2))² e^{−d} …: a right angle between the short side and the middle one
+        // needs 1 − e^{−2d} = s².
+        for s in [1e-3_f64, 1e-9, 1e-15] {
+            let d = -0.5 * (-s * s).ln_1p();
+            let (angle, _) = angles_and_cotangents_of_logs([0.0, -d, s.ln()]).unwrap();
+            close(angle[0], FRAC_PI_2, 1e-14);
+            assert!((angle[2] / s - 1.0).abs() < 1e-6);
+        }
+        assert!(angles_and_cotangents_of_logs([0.0, -1.0, -2.0]).is_none());
+        assert!(angles_and_cotangents_of_logs([0.0, f64::NAN, 0.0]).is_none());
+        assert!(angles_and_cotangents_of_logs([f64::NAN; 3]).is_none());
     }
 
     #[test]

@@ -3,9 +3,12 @@
 //! `AFFINE_ATLAS_CORPUS` names a folder of real models; without it, cases that need one are reported as ignored.
 //! `AFFINE_ATLAS_CHECKER` names an independent checker; `reference_u.npz` beside it holds the u of an independent prototype.
 
+mod invariance;
 mod models;
 mod prescriptions;
 mod reference;
+mod refinement;
+mod stress;
 
 use libtest_mimic::{Arguments, Failed, Trial};
 use std::path::PathBuf;
@@ -46,6 +49,32 @@ fn main() {
             prescriptions::converge(&file)
         }));
     }
+    type Case = fn(&std::path::Path) -> Result<(), String>;
+    let stress: [(&str, Case); 3] = [
+        ("squashed", stress::squashed),
+        ("needles", stress::needles),
+        ("decimated", stress::decimated),
+    ];
+    for (what, run) in stress {
+        for name in MODELS {
+            let file = corpus.as_ref().map(|c| c.join(name));
+            let run = move |file: PathBuf| run(&file);
+            trials.push(trial(format!("{what}/{name}"), file, run));
+        }
+    }
+    for name in [
+        "spot.obj",
+        "bunny-closed.off",
+        "three-holes.off",
+        "lilium.obj",
+    ] {
+        let file = corpus.as_ref().map(|c| c.join(name));
+        let run = |file: PathBuf| invariance::hold(&file);
+        trials.push(trial(format!("invariance/{name}"), file, run));
+    }
+    trials.push(trial("refinement/torus".into(), Some(()), |()| {
+        refinement::torus()
+    }));
     let both = corpus.clone().zip(beside_checker);
     trials.push(trial("reference".into(), both, |(corpus, file)| {
         reference::agree(&corpus, &file)

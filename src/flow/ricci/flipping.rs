@@ -42,7 +42,7 @@ pub(super) fn flow(
     let mut delaunay = Delaunay::new(base.clone(), &base_length, vec![identity]);
     delaunay.flip_in_the_surface();
     let b = delaunay.connectivity.clone();
-    let delaunay_length: EdgeVec<f64> = delaunay.log_length.iter().map(|l| l.exp()).collect();
+    let delaunay_length = exponential(&delaunay.log_lengths());
     let base_on_delaunay = delaunay.correspondences[0].clone();
     // B to C.
     delaunay.correspondences.push(Correspondence::identity(&b));
@@ -70,22 +70,35 @@ pub(super) fn flow(
     let Some(mut delaunay) = problem.metric.into_delaunay() else {
         return Err(FlowError::Cancelled);
     };
+    // Newton has taken u into the lengths, the gradient flow has not.
+    let rest = u.iter().zip(delaunay.scale().iter()).map(|(u, s)| u - s);
+    let mut rest: VertexVec<f64> = rest.collect();
     if scale_free {
         let largest = u.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        shift(&mut u, -largest);
-        let flat = metric::total_area(&delaunay.connectivity, &lengths(&delaunay, &u));
+        shift(&mut rest, -largest);
+        delaunay.rebase(&rest);
+        let flat = metric::total_area(
+            &delaunay.connectivity,
+            &exponential(&delaunay.log_lengths()),
+        );
         let source = metric::total_area(&base, &base_length);
         let constant = 0.5 * (source / flat).ln();
-        if constant.is_finite() {
-            shift(&mut u, constant);
-        }
+        let constant = if constant.is_finite() { constant } else { 0.0 };
+        rest.as_mut_slice().fill(constant);
+        shift(&mut u, constant - largest);
     }
+    delaunay.rebase(&rest);
+    let (length, c) = (delaunay.log_lengths(), &delaunay.connectivity);
+    let penner = length.enumerate().map(|(e, l)| {
+        let [i, j] = c.edge_vertices(e);
+        l - 0.5 * (u[i] + u[j])
+    });
+    let penner: EdgeVec<f64> = penner.collect();
     let own = surface.connectivity.vertex_count();
     let curvature = evaluation.curvature.enumerate().take(own);
     let curvature = curvature
         .map(|(v, k)| k * if on_boundary(v) { 0.5 } else { 1.0 })
         .collect();
-    let length = lengths(&delaunay, &u);
     let (Some(delaunay_on_flat), Some(base_on_flat)) = (
         delaunay.correspondences.pop(),
         delaunay.correspondences.pop(),
@@ -94,7 +107,7 @@ pub(super) fn flow(
     };
     Ok(FlatMetric {
         log_scale: u.as_slice()[..own].to_vec().into(),
-        length,
+        length: exponential(&length),
         curvature,
         history,
         max_curvature_error,
@@ -106,7 +119,7 @@ pub(super) fn flow(
             delaunay: b,
             delaunay_length,
             flat: delaunay.connectivity,
-            penner: delaunay.log_length,
+            penner,
             u,
             base_on_delaunay,
             delaunay_on_flat,
@@ -115,8 +128,6 @@ pub(super) fn flow(
     })
 }
 
-/// Flat length of every edge of the triangulation now, source units.
-fn lengths(delaunay: &Delaunay, u: &VertexVec<f64>) -> EdgeVec<f64> {
-    let logs = delaunay.log_lengths(u);
-    logs.iter().map(|l| l.exp()).collect()
+fn exponential(values: &EdgeVec<f64>) -> EdgeVec<f64> {
+    values.iter().map(|l| l.exp()).collect()
 }

@@ -194,7 +194,8 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
         if converged && (settled || polished == POLISHING_STEPS) {
             break;
         }
-        let exhausted = record.iteration >= params.max_newton_steps || spread(&u) > LARGEST_RANGE;
+        let exhausted = record.iteration >= params.max_newton_steps
+            || spread(&problem.metric.total(&u)) > LARGEST_RANGE;
         if !converged && exhausted {
             return Err(problem.not_converged(record.iteration, &now));
         }
@@ -202,8 +203,11 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
             system = System::new(problem, Some(system))?;
         }
         let hessian = system.assemble(problem, &weight);
-        let taken = if converged {
+        // Near the end a full step either lowers the error or rounding is the limit.
+        let near = converged || record.max_error <= FLOAT64_FLOOR;
+        let taken = if near {
             polished += 1;
+            let falls = if converged { 0.5 } else { 1.0 };
             let direction = SHIFTS[..3]
                 .iter()
                 .find_map(|&shift| system.direction(&hessian, shift, &residual));
@@ -212,7 +216,7 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
                 .filter(|direction| {
                     let next = moved(&u, direction, 1.0);
                     problem.metric.evaluate(&next, &mut trial);
-                    problem.max_error(&trial) < 0.5 * record.max_error
+                    problem.max_error(&trial) < falls * record.max_error
                 })
                 .map(|direction| (direction, 1.0))
         } else {
@@ -223,7 +227,7 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
             })
         };
         let Some((direction, step)) = taken else {
-            if converged || record.max_error <= FLOAT64_FLOOR {
+            if near {
                 // The last trial may have flipped edges: `now` is measured anew on them.
                 problem.metric.evaluate(&u, &mut now);
                 break;
@@ -246,6 +250,7 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
             problem.energy_change(&u, &direction, step, &mut now)
         };
         u = moved(&u, &direction, step);
+        problem.metric.rebase(&mut u);
         std::mem::swap(&mut now, &mut trial);
         residual = next_residual;
         record.iteration += 1;
@@ -260,10 +265,11 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
         return Err(problem.not_converged(record.iteration, &now));
     }
     if remaining > REMAINING_CHANGE {
-        return Err(problem.runaway(record.iteration, &u, remaining));
+        let total = problem.metric.total(&u);
+        return Err(problem.runaway(record.iteration, &total, remaining));
     }
     Ok(Solution {
-        u,
+        u: problem.metric.total(&u),
         evaluation: now,
         history,
     })
