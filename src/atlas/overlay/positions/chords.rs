@@ -98,9 +98,9 @@ impl FaceChords {
     pub(super) fn met(&self, from: ChordEnd, to: ChordEnd, met: &mut Vec<Met>) {
         met.clear();
         match (from, to) {
-            (ChordEnd::Corner(k), ChordEnd::Side(end)) => self.from_corner(k, end, met),
+            (ChordEnd::Corner(k), ChordEnd::Side(end)) => self.leave_corner(k, end, met),
             (ChordEnd::Side(end), ChordEnd::Corner(k)) => {
-                self.from_corner(k, end, met);
+                self.leave_corner(k, end, met);
                 met.reverse();
                 for chord in met {
                     chord.anchor_on_left ^= true;
@@ -112,7 +112,7 @@ impl FaceChords {
     }
 
     /// From corner k to the side opposite.
-    fn from_corner(&self, k: usize, end: Anchor, met: &mut Vec<Met>) {
+    fn leave_corner(&self, k: usize, end: Anchor, met: &mut Vec<Met>) {
         let (j, m) = ((k + 1) % 3, (k + 2) % 3);
         let mut add = |side, number, anchor_on_left| {
             met.push(Met {
@@ -293,8 +293,8 @@ mod tests {
                 continue;
             };
             let mut ends: Vec<ChordEnd> = (0..3).map(ChordEnd::Corner).collect();
-            for side in 0..3 {
-                for number in 0..=on_side[side] {
+            for (side, &points) in on_side.iter().enumerate() {
+                for number in 0..=points {
                     ends.push(ChordEnd::Side(Anchor { side, number }));
                 }
             }

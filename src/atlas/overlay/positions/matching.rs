@@ -56,8 +56,8 @@ pub(super) fn matched(
         .zip(word[head..].iter().rev())
         .take_while(same)
         .count();
-    for i in 0..head {
-        found(i, &word[i]);
+    for (i, drawn) in word[..head].iter().enumerate() {
+        found(i, drawn);
     }
     for i in 1..=tail {
         found(minimal.len() - i, &word[word.len() - i]);

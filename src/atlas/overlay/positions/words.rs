@@ -243,12 +243,12 @@ impl Drawing<'_> {
     fn weights_on(&self, anchor: Anchor, point: usize, h: HalfedgeId) -> [f64; 3] {
         side_weights(
             anchor.side,
-            self.from_tail(self.geodesic[point].on_delaunay, h),
+            self.seen_along(self.geodesic[point].on_delaunay, h),
         )
     }
 
     /// A fraction of an edge of B, counted from the tail of `h`.
-    fn from_tail(&self, t: f64, h: HalfedgeId) -> f64 {
+    fn seen_along(&self, t: f64, h: HalfedgeId) -> f64 {
         let delaunay = &self.intrinsic.delaunay;
         if h == delaunay.edge_halfedge(delaunay.edge(h)) {
             t
@@ -270,7 +270,7 @@ impl Drawing<'_> {
         };
         Place {
             end: ChordEnd::Side(Anchor { side, number }),
-            weights: side_weights(side, self.from_tail(self.straight[i].on_delaunay, h)),
+            weights: side_weights(side, self.seen_along(self.straight[i].on_delaunay, h)),
             on_base: self.straight[i].on_base,
         }
     }
