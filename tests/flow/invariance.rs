@@ -21,7 +21,7 @@ pub fn hold(file: &Path) -> Result<(), String> {
     let squashed = Model::with(flat.connectivity, flat.positions);
     for (name, model) in [("as it is", &model), ("squashed", &squashed)] {
         for seed in [3, 8] {
-            let prescription = prescriptions::random(model, seed);
+            let prescription = prescriptions::random(model, seed, prescriptions::RANGE);
             let u = scale(model, &prescription)?;
             let against = |what: &str, other: Vec<f64>| {
                 let worst = difference(&u, &other);

@@ -59,7 +59,7 @@ fn main() {
         for name in MODELS {
             let file = corpus.as_ref().map(|c| c.join(name));
             let run = move |file: PathBuf| run(&file);
-            trials.push(trial(format!("{what}/{name}"), file, run));
+            trials.push(trial(format!("stress/{what}/{name}"), file, run));
         }
     }
     for name in [

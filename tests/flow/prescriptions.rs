@@ -10,13 +10,13 @@ use std::time::Instant;
 /// Prescriptions a model.
 pub const SEEDS: u64 = 20;
 /// Least and greatest curvature of a cone, in units of π.
-const RANGE: [f64; 2] = [-6.0, 1.9];
+pub const RANGE: [f64; 2] = [-6.0, 1.9];
 /// Most cones.
 const MOST: usize = 12;
 
-/// As few cones as can meet Gauss–Bonnet up to [`MOST`], each in [`RANGE`]. Surfaces with boundary: even seeds leave it free, odd ones
+/// As few cones as can meet Gauss–Bonnet up to [`MOST`], each in `range` (units of π). Surfaces with boundary: even seeds leave it free, odd ones
 /// spread what the cones leave evenly over it.
-pub fn random(model: &Model, seed: u64) -> Prescription {
+pub fn random(model: &Model, seed: u64, range: [f64; 2]) -> Prescription {
     let c = &model.connectivity;
     let topology = c.topology();
     let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ c.vertex_count() as u64);
@@ -25,7 +25,7 @@ pub fn random(model: &Model, seed: u64) -> Prescription {
     }
     let total = 2.0 * topology.euler_characteristic as f64;
     let (inner, outer): (Vec<_>, Vec<_>) = c.vertices().partition(|&v| !c.is_boundary_vertex(v));
-    let [low, high] = RANGE;
+    let [low, high] = range;
     // Units of π; what the cones may sum to.
     let (least, greatest) = if outer.is_empty() {
         (total, total)
@@ -78,7 +78,7 @@ pub fn converge(file: &Path) -> Result<(), String> {
     let (mut steps, mut flips, mut worst, mut range) = (Vec::new(), Vec::new(), 0.0f64, 0.0f64);
     let start = Instant::now();
     for seed in 0..SEEDS {
-        let prescription = random(&model, seed);
+        let prescription = random(&model, seed, RANGE);
         match model.flow(&prescription, 1e-10) {
             Ok(flat) if flat.max_curvature_error <= 1e-10 => {
                 let last = flat.history.last().unwrap();

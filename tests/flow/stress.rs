@@ -6,7 +6,10 @@ use std::collections::{BTreeSet, BinaryHeap};
 use std::path::Path;
 
 /// Prescriptions a mesh.
-const SEEDS: u64 = 4;
+const SEEDS: [u64; 4] = [0, 1, 2, 3];
+/// Least and greatest curvature of a cone, in units of π. On a plate a thousand times as wide as thick, cones of −6π would need scales
+/// far beyond e^±300.
+const RANGE: [f64; 2] = [-1.0, 0.9];
 /// Factor along one axis.
 const SQUASH: f64 = 1e-3;
 /// Longest side over height of an inserted needle.
@@ -27,7 +30,9 @@ pub fn squashed(file: &Path) -> Result<(), String> {
         // A plate that lies across the axis would become a line of coinciding points.
         let squashed = Model::with(model.connectivity.clone(), positions);
         if squashed.length.iter().all(|&l| l > 0.0) {
-            failures.extend(converge(&squashed).err());
+            // Even seeds leave a boundary free. To bend the border of a strip a thousand times as long as wide into a circle takes scales
+            // beyond e^±300, which is refused with that reason.
+            failures.extend(converge(&squashed, [0, 2, 4, 6]).err());
         }
     }
     summary(failures)
@@ -54,7 +59,7 @@ pub fn needles(file: &Path) -> Result<(), String> {
         faces.extend([[b, c, m], [c, a, m]]);
     }
     summary(
-        converge(&Model::new(&faces, positions))
+        converge(&Model::new(&faces, positions), SEEDS)
             .err()
             .into_iter()
             .collect(),
@@ -70,13 +75,13 @@ pub fn decimated(file: &Path) -> Result<(), String> {
     );
     assert_eq!(before.genus, after.genus);
     assert_eq!(before.boundary_loops, after.boundary_loops);
-    summary(converge(&coarse).err().into_iter().collect())
+    summary(converge(&coarse, SEEDS).err().into_iter().collect())
 }
 
-fn converge(model: &Model) -> Result<(), String> {
+fn converge(model: &Model, seeds: [u64; 4]) -> Result<(), String> {
     let mut failures = Vec::new();
-    for seed in 0..SEEDS {
-        let prescription = prescriptions::random(model, seed);
+    for seed in seeds {
+        let prescription = prescriptions::random(model, seed, RANGE);
         match model.flow(&prescription, 1e-10) {
             Ok(flat) if flat.max_curvature_error <= 1e-10 => {}
             Ok(flat) => failures.push(format!("seed {seed}: {:e}", flat.max_curvature_error)),

@@ -92,6 +92,16 @@ pub enum FlowError {
         /// By how much a further step would still change the difference of two `u`; infinite where no step exists.
         change: f64,
     },
+    /// The flat metric exists, but its scales leave float64.
+    #[error(
+        "the flat metric needs lengths that are scaled by factors more than e^{range:.0} apart (reached after {iterations} steps), which float64 does not hold; prescribe more cones of less curvature each, or leave the boundary free"
+    )]
+    ScaleRange {
+        /// Steps taken.
+        iterations: usize,
+        /// Largest minus smallest `u` where it ended.
+        range: f64,
+    },
     /// The double of the surface could not be made.
     #[error(transparent)]
     Double(#[from] ConnectivityError),

@@ -240,6 +240,13 @@ impl Problem<'_> {
         change
     }
 
+    /// Lets mirror images have a `u` of their own; false where all have already.
+    fn separate(&mut self) -> bool {
+        let vertices = self.metric.connectivity().vertices();
+        let own = vertices.collect();
+        std::mem::replace(&mut self.shares, own) != self.shares
+    }
+
     fn minimise(&mut self) -> Result<Solution, FlowError> {
         match self.params.solver {
             Solver::Newton => newton::minimise(self),
@@ -253,6 +260,14 @@ impl Problem<'_> {
             self.max_error(evaluation),
             &evaluation.broken_faces(),
         )
+    }
+
+    /// With flips a solution exists always: then its scales are beyond float64.
+    fn out_of_range(&self, iterations: usize, range: f64, evaluation: &Evaluation) -> FlowError {
+        match self.metric.may_flip() {
+            true => FlowError::ScaleRange { iterations, range },
+            false => self.not_converged(iterations, evaluation),
+        }
     }
 
     /// The tolerance is met, but a further step would still change `u` by `change`.

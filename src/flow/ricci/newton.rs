@@ -23,6 +23,9 @@ use crate::geometry::ids::{EdgeId, EdgeVec, NONE, VertexId, VertexVec};
 const LARGEST_CHANGE: f64 = 20.0;
 /// Largest range of `u`: beyond it lengths leave float64, and `u` runs away from a minimum that does not exist.
 const LARGEST_RANGE: f64 = 600.0;
+/// Change of `u` in one step below which an error that no longer falls is one of symmetry: rounding in flips is not symmetric, in the
+/// thinnest faces that is more than the tolerance, and only a `u` that is not quite symmetric either meets it.
+const SYMMETRY_FLOOR: f64 = 1e-9;
 /// The line search gives up below this step.
 const SMALLEST_STEP: f64 = 1e-10;
 /// Share of the edges that may be flipped before the unknowns are ordered anew: a stale order lets the factor fill up many times
@@ -194,10 +197,12 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
         if converged && (settled || polished == POLISHING_STEPS) {
             break;
         }
-        let exhausted = record.iteration >= params.max_newton_steps
-            || spread(&problem.metric.total(&u)) > LARGEST_RANGE;
-        if !converged && exhausted {
+        if !converged && record.iteration >= params.max_newton_steps {
             return Err(problem.not_converged(record.iteration, &now));
+        }
+        let range = spread(&problem.metric.total(&u));
+        if !converged && range > LARGEST_RANGE {
+            return Err(problem.out_of_range(record.iteration, range, &now));
         }
         if system.flips != problem.metric.flips() {
             system = System::new(problem, Some(system))?;
@@ -227,6 +232,15 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
             })
         };
         let Some((direction, step)) = taken else {
+            if !converged && problem.separate() {
+                problem.metric.evaluate(&u, &mut now);
+                weight = problem.metric.edge_weights(&now);
+                residual = problem.residual(&now);
+                record.max_error = problem.max_error(&now);
+                system = System::new(problem, None)?;
+                polished = 0;
+                continue;
+            }
             if near {
                 // The last trial may have flipped edges: `now` is measured anew on them.
                 problem.metric.evaluate(&u, &mut now);
@@ -253,6 +267,7 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
         problem.metric.rebase(&mut u);
         std::mem::swap(&mut now, &mut trial);
         residual = next_residual;
+        let last_error = record.max_error;
         record.iteration += 1;
         record.max_error = problem.max_error(&now);
         record.step = step;
@@ -260,6 +275,13 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
         record.flips = problem.metric.flips() - history.iter().map(|s| s.flips).sum::<usize>();
         history.push(record);
         problem.observer.flow_step(&record);
+        let symmetric_floor = record.max_error > params.curvature_tolerance
+            && record.max_error > 0.5 * last_error
+            && spread(&direction) < SYMMETRY_FLOOR;
+        if symmetric_floor && problem.separate() {
+            system = System::new(problem, None)?;
+            polished = 0;
+        }
     }
     if now.shape.iter().any(|s| s.broken) {
         return Err(problem.not_converged(record.iteration, &now));
