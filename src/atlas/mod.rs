@@ -3,5 +3,6 @@ pub mod charts;
 pub mod cut;
 pub mod develop;
 pub mod geometry_image;
+pub mod overlay;
 pub mod patches;
 pub mod plane;
