@@ -72,20 +72,15 @@ impl<'a> Crossings<'a> {
     }
 
     fn check_order(&self) -> Result<(), OverlayError> {
-        let increases = |values: &mut dyn Iterator<Item = f64>| {
-            let mut last = 0.0;
-            // NaN is in no order.
-            values.all(|x| last < std::mem::replace(&mut last, x)) && last < 1.0
-        };
         for e in self.base.edges() {
             let range = self.curves.range(e);
-            if !range.is_empty() && !increases(&mut self.on_base[range].iter().copied()) {
+            if !increases(self.on_base[range].iter().copied()) {
                 return Err(OverlayError::Positions);
             }
         }
         for e in self.flat.edges() {
             let range = &self.along[self.range(e)];
-            if !increases(&mut range.iter().map(|&i| self.on_flat[i as usize])) {
+            if !increases(range.iter().map(|&i| self.on_flat[i as usize])) {
                 return Err(OverlayError::Positions);
             }
         }
@@ -178,4 +173,17 @@ impl<'a> Crossings<'a> {
         let twin = self.flat.twin(flat_halfedge);
         twin.ok_or_else(|| OverlayError::inconsistent("final edge", edge))
     }
+}
+
+/// True where the values lie strictly between 0 and 1, each above the one before.
+fn increases(values: impl Iterator<Item = f64>) -> bool {
+    let mut last = 0.0;
+    for x in values {
+        // NaN is above nothing.
+        if x <= last || x.is_nan() {
+            return false;
+        }
+        last = x;
+    }
+    last < 1.0
 }

@@ -44,9 +44,8 @@ pub(super) struct Under {
     /// Fractions along the final halfedge where it begins and ends.
     pub low: f64,
     pub high: f64,
-    /// Number of pieces before this one on the layout halfedge, and of all of them.
+    /// Number of pieces before this one on the layout halfedge.
     pub offset: usize,
-    pub pieces: usize,
 }
 
 /// The cells on the surface's own side; see the module docs.
@@ -115,12 +114,14 @@ impl Half {
         for e in x.flat.edges() {
             let before = self.mirror.len() as u32;
             for &index in &x.along[x.range(e)] {
-                self.interval_of_piece.push(self.mirror.len() as u32 - before);
+                self.interval_of_piece
+                    .push(self.mirror.len() as u32 - before);
                 if sides.is_mirror(x, index as usize) {
                     self.mirror.push(index);
                 }
             }
-            self.interval_of_piece.push(self.mirror.len() as u32 - before);
+            self.interval_of_piece
+                .push(self.mirror.len() as u32 - before);
             self.mirror_first.push(self.mirror.len() as u32);
         }
         let mut total = 0;
@@ -205,11 +206,19 @@ impl Half {
             let (edge, before, forward) = match (crossing(p), crossing(q)) {
                 (_, Some(q_index)) => {
                     let forward = x.curves.crossing[q_index].halfedge == halfedge(q);
-                    (sides.edge_of[q_index], q_index + usize::from(!forward), forward)
+                    (
+                        sides.edge_of[q_index],
+                        q_index + usize::from(!forward),
+                        forward,
+                    )
                 }
                 (Some(p_index), None) => {
                     let forward = x.curves.crossing[p_index].halfedge != halfedge(p);
-                    (sides.edge_of[p_index], p_index + usize::from(forward), forward)
+                    (
+                        sides.edge_of[p_index],
+                        p_index + usize::from(forward),
+                        forward,
+                    )
                 }
                 (None, None) => return Err(error()),
             };
@@ -305,9 +314,15 @@ impl Half {
         let range = x.range(e);
         let forward = x.flat.edge_halfedge(e) == h;
         let forward_piece = if forward { piece } else { range.len() - piece };
-        let interval = *self.interval_of_piece.get(range.start + e.index() + forward_piece)? as usize;
+        let interval = *self
+            .interval_of_piece
+            .get(range.start + e.index() + forward_piece)? as usize;
         let mirror = &self.mirror[self.mirror_range(e)];
-        let own = if forward { interval } else { mirror.len() - interval };
+        let own = if forward {
+            interval
+        } else {
+            mirror.len() - interval
+        };
         let under = self.interval[self.interval_first[h.index()] as usize + own];
         if under == NONE {
             return None;
@@ -320,18 +335,20 @@ impl Half {
             false => (head_of(interval), tail_of(interval)),
         };
         let first = tail.map_or(0, |i| x.rank(i, h) + 1);
-        let end = head.map_or(range.len(), |i| x.rank(i, h)) + 1;
         Some(Under {
             halfedge: HalfedgeId::new(under as usize),
             low: tail.map_or(0.0, |i| x.fraction(i, h)),
             high: head.map_or(1.0, |i| x.fraction(i, h)),
             offset: piece - first,
-            pieces: end - first,
         })
     }
 
     /// The layout halfedge that leaves the corner of `final_halfedge` in the cell of a layout halfedge.
-    pub fn corner_in_cell(&self, inside: HalfedgeId, final_halfedge: HalfedgeId) -> Option<HalfedgeId> {
+    pub fn corner_in_cell(
+        &self,
+        inside: HalfedgeId,
+        final_halfedge: HalfedgeId,
+    ) -> Option<HalfedgeId> {
         let f = inside.index() / 3;
         let cell = self.cell[f];
         let first = (0..f).rev().take_while(|&g| self.cell[g] == cell).last();

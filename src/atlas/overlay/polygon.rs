@@ -171,9 +171,8 @@ mod tests {
 
     fn polygon(points: &[[f64; 2]]) -> (Faces, Laid) {
         let corners: Vec<VertexId> = (0..points.len()).map(VertexId::new).collect();
-        let between = |i: usize, j: usize| {
-            (points[i][0] - points[j][0]).hypot(points[i][1] - points[j][1])
-        };
+        let between =
+            |i: usize, j: usize| (points[i][0] - points[j][0]).hypot(points[i][1] - points[j][1]);
         let flat = distances(points.len(), between);
         let mut faces = Faces::default();
         let laid = faces.polygon(&corners, &flat, None);
@@ -204,7 +203,10 @@ mod tests {
                 .sum();
             let (faces, laid) = polygon(&points);
             assert_eq!((laid.count, faces.count()), (n - 2, n - 2));
-            let areas = faces.length.chunks(3).map(|l| area([l[0], l[1], l[2]]).unwrap());
+            let areas = faces
+                .length
+                .chunks(3)
+                .map(|l| area([l[0], l[1], l[2]]).unwrap());
             assert!((areas.sum::<f64>() - shoelace).abs() < 1e-12);
             for (i, &h) in laid.side[..n].iter().enumerate() {
                 assert_eq!(faces.tail[h.index()], VertexId::new(i));

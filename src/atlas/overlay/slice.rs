@@ -63,7 +63,12 @@ pub(super) fn slice<E>(
         }
     };
     let fan = (0..3)
-        .map(|k| (k, n[(k + 1) % 3] - cut_off[(k + 1) % 3] - cut_off[(k + 2) % 3]))
+        .map(|k| {
+            (
+                k,
+                n[(k + 1) % 3] - cut_off[(k + 1) % 3] - cut_off[(k + 2) % 3],
+            )
+        })
         .find(|&(_, count)| count > 0);
     let Some((apex, count)) = fan else {
         let mut polygon = Polygon::default();
@@ -177,8 +182,9 @@ mod tests {
                     // Arcs join different sides, and every one has a region on each side.
                     assert_ne!(p.side, q.side, "{n:?} {polygon:?}");
                     let key = |p: Point| (p.side, p.place);
-                    *arcs.entry((key(p).min(key(q)), key(p).max(key(q)))).or_insert(0) +=
-                        if key(p) < key(q) { 1 } else { 10 };
+                    *arcs
+                        .entry((key(p).min(key(q)), key(p).max(key(q))))
+                        .or_insert(0) += if key(p) < key(q) { 1 } else { 10 };
                 }
             }
             assert_eq!(along, total + 3, "{n:?}: every piece of a side once");
