@@ -80,6 +80,7 @@ fn build_component(
         metric,
         prescription,
         layout,
+        ..
     } = overlay::overlay(mesh, metric, prescription)?;
     let c = &mesh.connectivity;
     enter("cut")?;

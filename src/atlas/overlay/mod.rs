@@ -17,6 +17,7 @@ mod flat_face;
 mod layout;
 mod mirror;
 mod polygon;
+pub mod positions;
 mod regions;
 mod slice;
 
@@ -36,6 +37,7 @@ use crossings::Crossings;
 use layout::Refinement;
 use mirror::{Half, Place};
 use polygon::Faces;
+use positions::{Positions, PositionsError};
 use regions::{Ground, Inputs, Regions};
 
 /// A surface with positions and flat lengths on the same faces.
@@ -49,6 +51,8 @@ pub struct Overlay {
     pub prescription: Prescription,
     /// What is cut and developed.
     pub layout: Layout,
+    /// Crossings whose places were guessed from their neighbours'; see [`Positions`].
+    pub unmatched: usize,
 }
 
 /// Why there is no overlay. None of these is expected: the integers come from the flips themselves.
@@ -76,6 +80,9 @@ pub enum OverlayError {
         /// Number of faces.
         faces: usize,
     },
+    /// The crossings could not be placed.
+    #[error(transparent)]
+    Places(#[from] PositionsError),
     /// The pieces do not make a surface.
     #[error(transparent)]
     Connectivity(#[from] ConnectivityError),
@@ -103,43 +110,14 @@ pub fn overlay(
             metric,
             prescription,
             layout,
+            unmatched: 0,
         });
     };
     let curves = intrinsic
         .base_on_flat
         .trace(&intrinsic.base, &intrinsic.flat)?;
-    let (on_base, on_flat) = evenly_spaced(&intrinsic, &curves);
-    refine(
-        mesh,
-        metric,
-        prescription,
-        *intrinsic,
-        &curves,
-        &on_base,
-        &on_flat,
-    )
-}
-
-/// Fractions along base edges and final edges that are in order, and know nothing of the geometry.
-fn evenly_spaced(intrinsic: &Intrinsic, curves: &Curves) -> (Vec<f64>, Vec<f64>) {
-    let count = curves.crossing.len();
-    let (mut on_base, mut on_flat) = (vec![0.0; count], vec![0.0; count]);
-    let mut crossings = EdgeVec::filled(0u32, intrinsic.flat.edge_count());
-    for x in &curves.crossing {
-        crossings[intrinsic.flat.edge(x.halfedge)] += 1;
-    }
-    for e in intrinsic.base.edges() {
-        let range = curves.range(e);
-        for i in range.clone() {
-            on_base[i] = (i - range.start + 1) as f64 / (range.len() + 1) as f64;
-            let x = curves.crossing[i];
-            let along = intrinsic.flat.edge(x.halfedge);
-            let part = f64::from(x.rank + 1) / f64::from(crossings[along] + 1);
-            let forward = intrinsic.flat.edge_halfedge(along) == x.halfedge;
-            on_flat[i] = if forward { part } else { 1.0 - part };
-        }
-    }
-    (on_base, on_flat)
+    let places = positions::positions(&intrinsic, &curves)?;
+    refine(mesh, metric, prescription, *intrinsic, &curves, &places)
 }
 
 /// The overlay from curves and the fractions of their crossings along both edges.
@@ -149,9 +127,9 @@ fn refine(
     prescription: Prescription,
     intrinsic: Intrinsic,
     curves: &Curves,
-    on_base: &[f64],
-    on_flat: &[f64],
+    places: &Positions,
 ) -> Result<Overlay, OverlayError> {
+    let (on_base, on_flat) = (&places.on_base, &places.on_flat);
     let (base, flat) = (&intrinsic.base, &intrinsic.flat);
     let front_faces = intrinsic.front_faces;
     let vertices = mesh.connectivity.vertex_count();
@@ -261,6 +239,7 @@ fn refine(
             ..prescription
         },
         layout,
+        unmatched: places.unmatched,
     })
 }
 
@@ -287,6 +266,7 @@ fn unrefined(
         mesh,
         metric,
         prescription,
+        unmatched: 0,
     })
 }
 
