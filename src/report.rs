@@ -269,6 +269,7 @@ mod tests {
     use crate::atlas::charts::chart;
     use crate::atlas::cut::cut;
     use crate::atlas::develop::develop;
+    use crate::atlas::overlay::Layout;
     use crate::flow::cones::{BoundaryCondition, Cone};
     use crate::geometry::ids::EdgeVec;
     use crate::geometry::polycube::{curvature, lengths, plate, polycube};
@@ -305,9 +306,11 @@ mod tests {
             cones,
             boundary,
         };
+        let layout = Layout::identity(c, &length);
         let cut = cut(c, &length, &prescription).unwrap();
-        let central = develop(c, &length, &cut).unwrap();
-        let charts = chart(c, &length, &cut, &central, &prescription).unwrap();
+        let unfolded = develop(&layout, cut.clone()).unwrap();
+        let central = Development::place(c, &cut, &layout, &unfolded);
+        let charts = chart(c, &cut, &central, &layout, &unfolded, &prescription).unwrap();
         let quality = measure(mesh, &metric, &cut, &central, &charts, &prescription);
         // Every interior cone lies on the cut, and no chain ends elsewhere.
         for v in c.vertices() {

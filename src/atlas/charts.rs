@@ -1,21 +1,21 @@
 //! Boundary and node charts, and the transitions from the central chart to them (tutorial 5.4, 5.5).
 //!
-//! *Enters:* flat lengths, cut graph, central development, target curvatures. *Leaves:* charts whose coordinates are
-//! developed at their own origin from the intrinsic lengths (never copied from the central chart, where
-//! a small one would have lost its digits), and the rigid motions between them.
+//! *Enters:* the overlay, its layout triangulation, cut graph and development of both, target curvatures. *Leaves:* charts
+//! whose coordinates are developed at their own origin from the layout's flat lengths (never copied from the central
+//! chart, where a small one would have lost its digits), and the rigid motions between them. A chart is a set of overlay
+//! faces; what is unfolded are the layout's cells under them, in which they are then placed.
 //!
 //! A boundary chart has two sectors, left and right of its segment, glued along the segment only
 //! (method: a face near both sides is in it twice). A node chart is the ring or fan of one node, a sector for each
 //! of its copies on the slit disk. No chart is made for interior cones: no planar chart exists there.
 
 use crate::atlas::cut::{CutGraph, Segment};
-use crate::atlas::develop::{Board, DevelopError, Development, Placement, Unfolder, step};
+use crate::atlas::develop::{Board, DevelopError, Development, Placement, Unfolded, Unfolder};
+use crate::atlas::overlay::Layout;
 use crate::atlas::plane::{RigidMotion, distance, doubled_area, rotate, wrap_angle};
 use crate::flow::cones::Prescription;
 use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{
-    ChartId, EdgeVec, FaceId, FaceVec, HalfedgeId, SegmentId, VertexId, VertexVec,
-};
+use crate::geometry::ids::{ChartId, FaceId, FaceVec, HalfedgeId, SegmentId, VertexId, VertexVec};
 use std::f64::consts::PI;
 
 /// What a chart covers.
@@ -108,33 +108,42 @@ pub enum ChartError {
 const FLAT: f64 = 1e-12;
 
 /// Makes boundary charts for all segments, node charts for flat and for boundary nodes, and the motions between them.
+///
+/// `overlay`, `cut` and `central` are the surface, its cut and its central chart; `unfolded` is the layout's own.
 pub fn chart(
-    connectivity: &Connectivity,
-    length: &EdgeVec<f64>,
+    overlay: &Connectivity,
     cut: &CutGraph,
     central: &Development,
+    layout: &Layout,
+    unfolded: &Unfolded,
     prescription: &Prescription,
 ) -> Result<Charts, ChartError> {
+    let under = &layout.connectivity;
+    let unfolder = Unfolder::new(under, &layout.length, &unfolded.cut, &unfolded.copy)?;
     let mut maker = ChartMaker {
-        c: connectivity,
+        c: overlay,
         cut,
         central,
-        unfolder: Unfolder::new(connectivity, length, cut, &central.copy)?,
-        board: Board::new(connectivity.face_count(), central.copies),
-        region: FaceVec::filled(false, connectivity.face_count()),
+        layout,
+        unfolded,
+        unfolder,
+        board: Board::new(under.face_count(), unfolded.copies),
+        member: FaceVec::filled(false, overlay.face_count()),
+        // There are no more cells than layout faces.
+        region: vec![false; under.face_count()],
     };
     let mut charts = vec![Chart {
         kind: ChartKind::Central,
         faces: Vec::new(),
     }];
     let mut transitions = Vec::new();
-    for (i, segment) in cut.segments.iter().enumerate() {
-        let sectors = maker.strip(segment);
+    for (i, (segment, under)) in cut.segments.iter().zip(&unfolded.cut.segments).enumerate() {
+        let sectors = maker.strip(segment, under);
         let kind = ChartKind::Boundary(SegmentId::new(i));
-        maker.add(kind, sectors, &mut charts, &mut transitions);
+        add(kind, sectors, &mut charts, &mut transitions);
     }
     for &node in &cut.nodes {
-        if has_chart(connectivity, &prescription.target, node) {
+        if has_chart(overlay, &prescription.target, node) {
             let sectors = maker.ring(node);
             if sectors.len() > usize::from(u8::MAX) {
                 return Err(ChartError::TooManySectors {
@@ -142,7 +151,7 @@ pub fn chart(
                     copies: sectors.len(),
                 });
             }
-            maker.add(
+            add(
                 ChartKind::Node(node),
                 sectors,
                 &mut charts,
@@ -150,7 +159,8 @@ pub fn chart(
             );
         }
     }
-    let gluings = cut.segments.iter().map(|s| maker.gluing(s)).collect();
+    let segments = unfolded.cut.segments.iter();
+    let gluings = segments.map(|s| maker.gluing(s)).collect();
     Ok(Charts {
         charts,
         transitions,
@@ -163,59 +173,71 @@ fn has_chart(c: &Connectivity, target: &VertexVec<f64>, node: VertexId) -> bool 
     c.is_boundary_vertex(node) || target[node].abs() < FLAT
 }
 
-/// Faces of one sector: id, angle of halfedge 0 in the chart, corners in the chart.
-type Sector = Vec<(FaceId, f64, [[f64; 2]; 3])>;
+/// One sector of a chart.
+struct Sector {
+    /// Overlay faces with their corners in the chart.
+    faces: Vec<(FaceId, [[f64; 2]; 3])>,
+    /// Central coordinates to those of the sector.
+    motion: RigidMotion,
+    /// Largest distance over the corners, source units.
+    residual: f64,
+}
 
 struct ChartMaker<'a> {
     c: &'a Connectivity,
     cut: &'a CutGraph,
     central: &'a Development,
+    layout: &'a Layout,
+    unfolded: &'a Unfolded,
     unfolder: Unfolder<'a>,
     board: Board,
-    region: FaceVec<bool>,
+    /// Overlay faces that were listed already.
+    member: FaceVec<bool>,
+    /// Cells that may be unfolded.
+    region: Vec<bool>,
 }
 
 impl ChartMaker<'_> {
-    /// Left and right sector of a segment, glued along its middle edge, which lies on the x axis from the origin.
-    fn strip(&mut self, segment: &Segment) -> Vec<Sector> {
+    /// Left and right sector of a segment, glued along its middle layout edge, which lies on the x axis from the origin.
+    fn strip(&mut self, segment: &Segment, under: &Segment) -> Vec<Sector> {
         let c = self.c;
-        let middle = segment.halfedges[segment.halfedges.len() / 2];
-        let l = self.unfolder.length(middle);
+        let middle = under.halfedges[under.halfedges.len() / 2];
         let left = Placement {
             halfedge: middle,
             tail: [0.0, 0.0],
             direction: 0.0,
         };
-        let left_corners: Vec<HalfedgeId> = segment.halfedges[1..].to_vec();
-        let mut sectors = vec![self.side(left, &segment.halfedges, &left_corners)];
+        let faces = self.faces_along(&segment.halfedges, &segment.halfedges[1..]);
+        let mut sectors = vec![self.sector(left, faces)];
         let twins: Vec<HalfedgeId> = segment
             .halfedges
             .iter()
             .filter_map(|&h| c.twin(h))
             .collect();
-        if let Some(twin) = c.twin(middle) {
+        if let Some(twin) = self.layout.connectivity.twin(middle) {
             let right = Placement {
                 halfedge: twin,
-                tail: [l, 0.0],
+                tail: [self.unfolder.length(middle), 0.0],
                 direction: PI,
             };
             // Twin i runs from vertex i + 1 back to vertex i, so all but the last leave an inner vertex.
-            sectors.push(self.side(right, &twins, &twins[..twins.len() - 1]));
+            let faces = self.faces_along(&twins, &twins[..twins.len() - 1]);
+            sectors.push(self.sector(right, faces));
         }
         sectors
     }
 
-    /// The faces along `edges` and those that touch the copies at `corners`, developed from `root`.
-    fn side(&mut self, root: Placement, edges: &[HalfedgeId], corners: &[HalfedgeId]) -> Sector {
+    /// The overlay faces along `edges` and those that touch the copies at `corners`.
+    fn faces_along(&mut self, edges: &[HalfedgeId], corners: &[HalfedgeId]) -> Vec<FaceId> {
         let c = self.c;
-        let mut members = Vec::new();
-        let mut add = |region: &mut FaceVec<bool>, f: FaceId| {
-            if !std::mem::replace(&mut region[f], true) {
-                members.push(f);
+        let mut faces = Vec::new();
+        let mut add = |f: FaceId| {
+            if !std::mem::replace(&mut self.member[f], true) {
+                faces.push(f);
             }
         };
         for &h in edges {
-            add(&mut self.region, c.face(h));
+            add(c.face(h));
         }
         for &corner in corners {
             // The copy's fan reaches both ways up to the cut or the boundary.
@@ -223,109 +245,85 @@ impl ChartMaker<'_> {
             let ccw = |&h: &HalfedgeId| Some(c.prev(h)).filter(open).and_then(|p| c.twin(p));
             let cw = |&h: &HalfedgeId| Some(h).filter(open).and_then(|h| c.rotate_cw(h));
             for h in std::iter::successors(Some(corner), ccw) {
-                add(&mut self.region, c.face(h));
+                add(c.face(h));
             }
             for h in std::iter::successors(Some(corner), cw) {
-                add(&mut self.region, c.face(h));
+                add(c.face(h));
             }
         }
-        self.board.clear();
-        let region = &self.region;
-        self.unfolder.unfold(root, |f| region[f], &mut self.board);
-        let board = &self.board;
-        let sector = board
-            .placed
-            .iter()
-            .map(|&(f, direction)| {
-                let corners = c.face_halfedges(f);
-                let uv = corners.map(|h| board.position[self.central.copy[h] as usize]);
-                (f, direction, uv)
-            })
-            .collect();
-        for f in members {
-            self.region[f] = false;
+        for &f in &faces {
+            self.member[f] = false;
         }
-        sector
+        faces
     }
 
     /// The faces around a node, the node at the origin, a sector for each of its copies.
-    fn ring(&self, node: VertexId) -> Vec<Sector> {
-        let c = self.c;
-        let start = c
-            .outgoing(node)
-            .find(|&h| c.is_boundary_vertex(node) || self.cut.is_cut[c.edge(h)])
-            .unwrap_or_else(|| c.vertex_halfedge(node));
-        let mut sectors: Vec<Sector> = Vec::new();
+    fn ring(&mut self, node: VertexId) -> Vec<Sector> {
+        let start = ring_start(self.c, self.cut, node);
+        let fans = fans(self.c, self.cut, start);
+        // The same fans on the layout, from the same cut edge or boundary edge.
+        let under = &self.layout.connectivity;
+        let start = match under.is_boundary_vertex(node) {
+            true => under.vertex_halfedge(node),
+            false => self.layout.carrier(start).halfedge,
+        };
         let mut direction = 0.0;
-        let mut at = Some(start);
-        while let Some(h) = at {
-            let (next, prev) = (c.next(h), c.prev(h));
-            if sectors.is_empty() || self.cut.is_cut[c.edge(h)] {
-                sectors.push(Vec::new());
-            }
-            let angle = self.unfolder.angle(h);
-            let mut uv = [[0.0; 2]; 3];
-            uv[c.corner(next)] = step([0.0; 2], self.unfolder.length(h), direction);
-            uv[c.corner(prev)] = step([0.0; 2], self.unfolder.length(prev), direction + angle);
-            let turned = self.unfolder.halfedge_direction(0.0, h);
-            if let Some(sector) = sectors.last_mut() {
-                sector.push((c.face(h), wrap_angle(direction - turned), uv));
-            }
-            direction += angle;
-            at = c.rotate_ccw(h).filter(|&n| n != start);
-        }
-        sectors
-    }
-
-    fn add(
-        &self,
-        kind: ChartKind,
-        sectors: Vec<Sector>,
-        charts: &mut Vec<Chart>,
-        transitions: &mut Vec<Transition>,
-    ) {
-        let to = ChartId::new(charts.len());
-        let mut faces = Vec::new();
-        for (i, sector) in sectors.into_iter().enumerate() {
-            let (motion, residual) = self.motion_to(&sector);
-            transitions.push(Transition {
-                from: ChartId::new(0),
-                to,
-                sector: i as u8,
-                motion,
-                residual,
-                faces: sector.len(),
+        let mut roots = Vec::new();
+        for fan in self::fans(under, &self.unfolded.cut, start) {
+            roots.push(Placement {
+                halfedge: fan[0],
+                tail: [0.0, 0.0],
+                direction: wrap_angle(direction),
             });
-            faces.extend(sector.into_iter().map(|(face, _, uv)| ChartFace {
-                face,
-                sector: i as u8,
-                uv,
-            }));
+            direction += fan.iter().map(|&h| self.unfolder.angle(h)).sum::<f64>();
         }
-        charts.push(Chart { kind, faces });
+        let faces = |fan: Vec<HalfedgeId>| fan.into_iter().map(|h| self.c.face(h)).collect();
+        let faces: Vec<Vec<FaceId>> = fans.into_iter().map(faces).collect();
+        let sectors = roots.into_iter().zip(faces);
+        sectors
+            .map(|(root, faces)| self.sector(root, faces))
+            .collect()
     }
 
-    /// Central coordinates to those of a sector: rotation from the faces' directions (which small faces still
-    /// know), translation from all corners.
-    fn motion_to(&self, sector: &Sector) -> (RigidMotion, f64) {
-        let turns = sector.iter().map(|&(f, direction, uv)| {
-            (
-                direction - self.central.direction[f],
-                doubled_area(uv).abs(),
-            )
+    /// Unfolds the cells under some overlay faces from `root` and places the faces in them.
+    fn sector(&mut self, root: Placement, faces: Vec<FaceId>) -> Sector {
+        let layout = self.layout;
+        for &f in &faces {
+            self.region[layout.cell_under(f) as usize] = true;
+        }
+        self.board.clear();
+        let region = &self.region;
+        let allowed = |f| region[layout.cell[f] as usize];
+        self.unfolder.unfold(root, allowed, &mut self.board);
+        let (board, copy) = (&self.board, &self.unfolded.copy);
+        let corner = |h| layout.place(h, |g| board.position[copy[g] as usize]);
+        let place = |f: FaceId| (f, self.c.face_halfedges(f).map(corner));
+        let placed: Vec<(FaceId, [[f64; 2]; 3])> = faces.iter().map(|&f| place(f)).collect();
+        // Rotation from the layout faces' directions (which small faces still know), translation from all corners.
+        let turns = board.placed.iter().map(|&(f, direction)| {
+            let uv = self.unfolded.uv[f];
+            let weight = doubled_area(uv).abs();
+            (direction - self.unfolded.direction[f], weight)
         });
         let rotation = mean_angle(turns);
         let pairs = || {
-            sector
-                .iter()
-                .flat_map(|&(f, _, uv)| self.central.uv[f].into_iter().zip(uv))
+            let rows = placed.iter();
+            rows.flat_map(|&(f, uv)| self.central.uv[f].into_iter().zip(uv))
         };
-        fit(rotation, pairs)
+        let (motion, residual) = fit(rotation, pairs);
+        for &f in &faces {
+            self.region[layout.cell_under(f) as usize] = false;
+        }
+        Sector {
+            faces: placed,
+            motion,
+            residual,
+        }
     }
 
-    /// Coordinates on the left of a segment to those on its right.
+    /// Coordinates on the left of a segment of the layout to those on its right.
     fn gluing(&self, segment: &Segment) -> Gluing {
-        let c = self.c;
+        let c = &self.layout.connectivity;
         let sides = || {
             segment
                 .halfedges
@@ -333,7 +331,7 @@ impl ChartMaker<'_> {
                 .filter_map(|&h| c.twin(h).map(|t| (h, t)))
         };
         let direction = |h: HalfedgeId| {
-            let face_direction = self.central.direction[c.face(h)];
+            let face_direction = self.unfolded.direction[c.face(h)];
             self.unfolder.halfedge_direction(face_direction, h)
         };
         let turns = sides().map(|(h, t)| {
@@ -341,7 +339,7 @@ impl ChartMaker<'_> {
             (turn, self.unfolder.length(h))
         });
         let rotation = mean_angle(turns);
-        let corner = |h: HalfedgeId| self.central.uv[c.face(h)][c.corner(h)];
+        let corner = |h: HalfedgeId| self.unfolded.uv[c.face(h)][c.corner(h)];
         let pairs = || {
             sides().flat_map(|(h, t)| {
                 [
@@ -353,6 +351,52 @@ impl ChartMaker<'_> {
         let (motion, residual) = fit(rotation, pairs);
         Gluing { motion, residual }
     }
+}
+
+/// Where the walk around a node begins: on the boundary, else at a cut edge.
+fn ring_start(c: &Connectivity, cut: &CutGraph, node: VertexId) -> HalfedgeId {
+    let cut_edge = |&h: &HalfedgeId| c.is_boundary_vertex(node) || cut.is_cut[c.edge(h)];
+    let found = c.outgoing(node).find(cut_edge);
+    found.unwrap_or_else(|| c.vertex_halfedge(node))
+}
+
+/// The outgoing halfedges from `start` counterclockwise, a new list at every cut edge.
+fn fans(c: &Connectivity, cut: &CutGraph, start: HalfedgeId) -> Vec<Vec<HalfedgeId>> {
+    let mut fans: Vec<Vec<HalfedgeId>> = Vec::new();
+    let ccw = |&h: &HalfedgeId| c.rotate_ccw(h).filter(|&n| n != start);
+    for h in std::iter::successors(Some(start), ccw) {
+        match fans.last_mut() {
+            Some(fan) if !cut.is_cut[c.edge(h)] => fan.push(h),
+            _ => fans.push(vec![h]),
+        }
+    }
+    fans
+}
+
+fn add(
+    kind: ChartKind,
+    sectors: Vec<Sector>,
+    charts: &mut Vec<Chart>,
+    transitions: &mut Vec<Transition>,
+) {
+    let to = ChartId::new(charts.len());
+    let mut faces = Vec::new();
+    for (i, sector) in sectors.into_iter().enumerate() {
+        transitions.push(Transition {
+            from: ChartId::new(0),
+            to,
+            sector: i as u8,
+            motion: sector.motion,
+            residual: sector.residual,
+            faces: sector.faces.len(),
+        });
+        faces.extend(sector.faces.into_iter().map(|(face, uv)| ChartFace {
+            face,
+            sector: i as u8,
+            uv,
+        }));
+    }
+    charts.push(Chart { kind, faces });
 }
 
 /// Weighted mean of angles that agree up to rounding and whole turns, in (−π, π].

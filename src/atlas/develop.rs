@@ -1,7 +1,8 @@
 //! Planar embedding of a flat disk (tutorial 5.5).
 //!
-//! *Enters:* connectivity, flat lengths, the cut. *Leaves:* plane coordinates, one for each vertex of the slit
-//! disk, and the error with which the disk closed up.
+//! *Enters:* the layout triangulation and its cut. *Leaves:* plane coordinates, one for each vertex of the slit
+//! disk, and the error with which the disk closed up; then the same disk with the overlay's faces, each placed inside
+//! its cell of the layout.
 //!
 //! Faces are unfolded one from another, but not as the tutorial does, by multiplying with the
 //! quotient of two coordinate differences: after a face of relative size 1e-12 that quotient has lost its direction.
@@ -11,6 +12,7 @@
 //! factor of two, so that no large face hangs on a small one or at the end of a long chain.
 
 use crate::atlas::cut::{CutGraph, slit_copies};
+use crate::atlas::overlay::Layout;
 use crate::atlas::plane::{distance, wrap_angle};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, HalfedgeId, HalfedgeVec};
@@ -19,14 +21,29 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::f64::consts::PI;
 
+/// The layout triangulation slit and laid out in the plane.
+#[derive(Clone, Debug)]
+pub struct Unfolded {
+    /// The cut, on the layout.
+    pub cut: CutGraph,
+    /// Plane coordinates of the corners of every layout face, source units.
+    pub uv: FaceVec<[[f64; 2]; 3]>,
+    /// Angle of halfedge 0 of every layout face in the plane, radians in (−π, π]. It keeps its precision
+    /// where a face is too small for its coordinates to tell.
+    pub direction: FaceVec<f64>,
+    /// Vertex of the slit disk at the corner that a layout halfedge leaves.
+    pub copy: HalfedgeVec<u32>,
+    /// Number of vertices of the slit disk.
+    pub copies: usize,
+    /// Largest mismatch that was left when the disk was closed up, source units.
+    pub closing_error: f64,
+}
+
 /// The central chart.
 #[derive(Clone, Debug)]
 pub struct Development {
     /// Plane coordinates of the corners of every face, source units.
     pub uv: FaceVec<[[f64; 2]; 3]>,
-    /// Angle of halfedge 0 of every face in the plane, radians in (−π, π]. It keeps its precision
-    /// where a face is too small for its coordinates to tell.
-    pub direction: FaceVec<f64>,
     /// Vertex of the slit disk at the corner that a halfedge leaves: a vertex on the cut has several copies.
     pub copy: HalfedgeVec<u32>,
     /// Number of vertices of the slit disk.
@@ -36,16 +53,43 @@ pub struct Development {
 }
 
 impl Development {
-    /// A chart made up for a test, its directions from its coordinates.
+    /// The overlay's faces in the plane of its layout. `cut` is the layout's cut lifted to the overlay.
+    pub fn place(
+        overlay: &Connectivity,
+        cut: &CutGraph,
+        layout: &Layout,
+        unfolded: &Unfolded,
+    ) -> Self {
+        let c = &layout.connectivity;
+        let (copy, copies) = slit_copies(overlay, &cut.is_cut);
+        // One place a copy: the carriers of its corners agree up to rounding only.
+        let mut position = vec![UNPLACED; copies];
+        for h in overlay.halfedges() {
+            let place = &mut position[copy[h] as usize];
+            if place[0].is_nan() {
+                *place = layout.place(h, |g| unfolded.uv[c.face(g)][c.corner(g)]);
+            }
+        }
+        let corners = |f| overlay.face_halfedges(f);
+        let uv = overlay
+            .faces()
+            .map(|f| corners(f).map(|h| position[copy[h] as usize]));
+        Self {
+            uv: uv.collect(),
+            copy,
+            copies,
+            closing_error: unfolded.closing_error,
+        }
+    }
+
+    /// A chart made up for a test.
     #[cfg(test)]
     pub(crate) fn from_coordinates(
         uv: FaceVec<[[f64; 2]; 3]>,
         copy: HalfedgeVec<u32>,
         copies: usize,
     ) -> Self {
-        let angle = |t: &[[f64; 2]; 3]| (t[1][1] - t[0][1]).atan2(t[1][0] - t[0][0]);
         Self {
-            direction: uv.iter().map(angle).collect(),
             uv,
             copy,
             copies,
@@ -88,14 +132,11 @@ pub enum DevelopError {
     },
 }
 
-/// Develops the slit disk from its largest face.
-pub fn develop(
-    connectivity: &Connectivity,
-    length: &EdgeVec<f64>,
-    cut: &CutGraph,
-) -> Result<Development, DevelopError> {
+/// Slits the layout along a cut and develops the disk from its largest face.
+pub fn develop(layout: &Layout, cut: CutGraph) -> Result<Unfolded, DevelopError> {
+    let (connectivity, length) = (&layout.connectivity, &layout.length);
     let (copy, copies) = slit_copies(connectivity, &cut.is_cut);
-    let unfolder = Unfolder::new(connectivity, length, cut, &copy)?;
+    let unfolder = Unfolder::new(connectivity, length, &cut, &copy)?;
     let mut largest = (FaceId::new(0), -1.0);
     for f in connectivity.faces() {
         let size = unfolder
@@ -125,7 +166,8 @@ pub fn develop(
                 .map(|h| board.position[copy[h] as usize])
         })
         .collect();
-    Ok(Development {
+    Ok(Unfolded {
+        cut,
         uv,
         direction,
         copy,

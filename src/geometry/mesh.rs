@@ -40,6 +40,43 @@ impl CornerAttribute {
         &self.values[at..at + self.components]
     }
 
+    /// The same attribute of other faces.
+    pub fn with_values(&self, values: Vec<f32>) -> Self {
+        Self {
+            kind: self.kind.clone(),
+            components: self.components,
+            values,
+        }
+    }
+
+    /// Appends the value on a side of a face, at a fraction from the corner where the side begins; directions stay unit vectors.
+    pub fn interpolate(&self, face: usize, corner: usize, fraction: f64, into: &mut Vec<f32>) {
+        let from = self.corner(face, corner);
+        if fraction == 0.0 {
+            into.extend_from_slice(from);
+            return;
+        }
+        let to = self.corner(face, (corner + 1) % 3);
+        let mix =
+            |(&a, &b): (&f32, &f32)| (1.0 - fraction) * f64::from(a) + fraction * f64::from(b);
+        let direction = matches!(self.kind, AttributeKind::Normal | AttributeKind::Tangent);
+        let length = match direction {
+            true => from
+                .iter()
+                .zip(to)
+                .take(3)
+                .map(mix)
+                .map(|x| x * x)
+                .sum::<f64>()
+                .sqrt(),
+            false => 1.0,
+        };
+        let scale = if length > 0.0 { length } else { 1.0 };
+        let values = from.iter().zip(to).map(mix).enumerate();
+        // The fourth component of a tangent is a sign.
+        into.extend(values.map(|(i, x)| (if direction && i > 2 { x } else { x / scale }) as f32));
+    }
+
     fn set(&mut self, face: usize, corner: usize, value: &[f32]) {
         let at = (3 * face + corner) * self.components;
         self.values[at..at + self.components].copy_from_slice(value);

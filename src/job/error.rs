@@ -3,6 +3,7 @@
 use crate::atlas::charts::ChartError;
 use crate::atlas::cut::CutError;
 use crate::atlas::develop::DevelopError;
+use crate::atlas::overlay::OverlayError;
 use crate::atlas::patches::PatchError;
 use crate::export::ExportError;
 use crate::flow::cones::ConeError;
@@ -36,6 +37,9 @@ pub enum BuildError {
     /// The flow found no metric.
     #[error(transparent)]
     Flow(FlowError),
+    /// The mesh could not be refined by the final triangulation.
+    #[error(transparent)]
+    Overlay(#[from] OverlayError),
     /// The surface could not be slit.
     #[error(transparent)]
     Cut(#[from] CutError),
@@ -78,6 +82,7 @@ impl BuildError {
             BuildError::Flow(FlowError::GaussBonnet { .. }) => FailureKind::Prescription,
             BuildError::Flow(FlowError::BadLength { .. }) => FailureKind::Input,
             BuildError::Flow(_) | BuildError::Develop(_) => FailureKind::NotConverged,
+            BuildError::Overlay(_) => FailureKind::Internal,
             BuildError::Cut(CutError::NothingToCutAlong) => FailureKind::Prescription,
             BuildError::Cut(_) => FailureKind::Internal,
             BuildError::Chart(ChartError::TooManySectors { .. }) => FailureKind::Prescription,

@@ -10,7 +10,9 @@ mod inspect;
 pub use error::BuildError;
 pub use inspect::{Inspection, inspect};
 
-use crate::atlas::{charts, cut, develop, geometry_image, patches};
+use crate::atlas::develop::Development;
+use crate::atlas::overlay::Overlay;
+use crate::atlas::{charts, cut, develop, geometry_image, overlay, patches};
 use crate::config::Config;
 use crate::export::folder::{Staging, component_name, list_files};
 use crate::export::{self, ExportError, Provenance, pictures};
@@ -72,11 +74,22 @@ fn build_component(
     enter("flow")?;
     let metric = ricci::flow(c, &source_length, &prescription, &config.flow, observer)
         .map_err(|e| BuildError::flow(e, &mesh))?;
+    enter("overlay")?;
+    let Overlay {
+        mesh,
+        metric,
+        prescription,
+        layout,
+        ..
+    } = overlay::overlay(mesh, metric, prescription)?;
+    let c = &mesh.connectivity;
     enter("cut")?;
-    let cut = cut::cut(c, &source_length, &prescription)?;
+    let layout_cut = cut::cut(&layout.connectivity, &layout.cut_cost(&mesh), &prescription)?;
+    let cut = layout.lift(&layout_cut, c);
     enter("charts")?;
-    let central = develop::develop(c, &metric.length, &cut)?;
-    let charts = charts::chart(c, &metric.length, &cut, &central, &prescription)?;
+    let unfolded = develop::develop(&layout, layout_cut)?;
+    let central = Development::place(c, &cut, &layout, &unfolded);
+    let charts = charts::chart(c, &cut, &central, &layout, &unfolded, &prescription)?;
     enter("patches")?;
     let patches = patches::layout(&mesh, &metric.length, &cut, &central, &config.patches)?;
     enter("images")?;

@@ -1,0 +1,70 @@
+//! One face of the final triangulation, laid out by its lengths: distances between points on its sides.
+//!
+//! *Guaranteed:* full relative accuracy for any shape and any scale, since only differences along a side are ever taken: with a, b
+//! the distances of two points from the corner between their sides, d² = (a − b)² + 4 sin²(θ/2) ab.
+
+use crate::geometry::connectivity::Connectivity;
+use crate::geometry::ids::{EdgeVec, FaceId};
+
+/// A point on a side: which side, and the fraction of its length from the corner where it begins.
+pub(super) type OnSide = (usize, f64);
+
+/// Lengths and corners of a flat face.
+pub(super) struct FlatFace {
+    /// Length of side k, from corner k to corner k + 1.
+    side: [f64; 3],
+    /// 4 sin²(θ/2) at corner k.
+    opening: [f64; 3],
+}
+
+impl FlatFace {
+    pub fn new(flat: &Connectivity, length: &EdgeVec<f64>, f: FaceId) -> Self {
+        Self::from_sides(flat.face_halfedges(f).map(|h| length[flat.edge(h)]))
+    }
+
+    fn from_sides(side: [f64; 3]) -> Self {
+        let opening = [0, 1, 2].map(|k| {
+            let (a, b, opposite) = (side[k], side[(k + 2) % 3], side[(k + 1) % 3]);
+            let (low, high) = (opposite - (a - b), opposite + (a - b));
+            (low / a * (high / b)).max(0.0)
+        });
+        Self { side, opening }
+    }
+
+    /// Distance of two points; the same for either order.
+    pub fn distance(&self, p: OnSide, q: OnSide) -> f64 {
+        if p.0 == q.0 {
+            return (q.1 - p.1).abs() * self.side[p.0];
+        }
+        // Let q be on the side after p's, so that they meet at the corner where q's side begins.
+        let (p, q) = if q.0 == (p.0 + 1) % 3 { (p, q) } else { (q, p) };
+        let (a, b) = ((1.0 - p.1) * self.side[p.0], q.1 * self.side[q.0]);
+        (a - b).hypot((self.opening[q.0] * a).sqrt() * b.sqrt())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_agree_with_coordinates() {
+        // Corners (0, 0), (4, 0), (1, 3).
+        let corners = [[0.0, 0.0], [4.0, 0.0], [1.0, 3.0_f64]];
+        let between = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]);
+        let sides = [0, 1, 2].map(|k| between(corners[k], corners[(k + 1) % 3]));
+        let face = FlatFace::from_sides(sides);
+        let at = |(k, s): OnSide| -> [f64; 2] {
+            let (p, q) = (corners[k], corners[(k + 1) % 3]);
+            std::array::from_fn(|i| p[i] + s * (q[i] - p[i]))
+        };
+        let points: Vec<OnSide> = (0..12).map(|i| (i % 3, (i / 3) as f64 * 0.3)).collect();
+        for &p in &points {
+            for &q in &points {
+                let d = face.distance(p, q);
+                assert!((d - between(at(p), at(q))).abs() < 1e-14, "{p:?} {q:?}");
+                assert_eq!(d.to_bits(), face.distance(q, p).to_bits());
+            }
+        }
+    }
+}
