@@ -244,10 +244,7 @@ pub fn prescribe(
             }
         }
     }
-    for cone in chosen
-        .iter()
-        .chain(boundary::listed(mesh, requests)?)
-    {
+    for cone in chosen.iter().chain(boundary::listed(mesh, requests)?) {
         let v = cone.vertex;
         if let Some(first) = named[v].replace(cone.named) {
             return Err(ConeError::Twice {
@@ -261,7 +258,13 @@ pub fn prescribe(
     // Before the rest of the boundary, so that a message gives what the user wrote.
     check_angles(mesh, &target)?;
     boundary::prescribe(
-        mesh, &topology, requests, condition, boundary, &named, &mut target,
+        mesh,
+        &topology,
+        requests,
+        condition,
+        boundary,
+        &named,
+        &mut target,
     )?;
     check_angles(mesh, &target)?;
     check_total(mesh, &topology, condition, &mut target)?;

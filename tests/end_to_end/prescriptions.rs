@@ -1,6 +1,6 @@
 //! Curvature that cannot be prescribed, as the configuration says it.
 
-use crate::command::{build, document};
+use crate::command::{build, document, verify};
 use std::path::Path;
 
 fn refusal(fixture: &str, settings: &[&str]) -> String {
@@ -78,10 +78,43 @@ fn a_packing_that_cannot_exist() {
 
 #[test]
 fn a_triangle_inequality_that_breaks_ends_without_an_atlas() {
-    let settings = ["cones.strategy=single", "flow.scheme=vertex-scaling"];
+    let settings = [
+        "cones.strategy=single",
+        "flow.scheme=vertex-scaling",
+        "flow.delaunay=false",
+    ];
     let message = refusal("genus-3-pretzel.obj", &settings);
     assert!(message.contains("(not_converged)"), "{message}");
     assert!(message.contains("face"), "{message}");
+    assert!(message.contains("flow.delaunay = true"), "{message}");
+}
+
+/// What breaks a packing or a triangle above has a solution with flips, and no split is needed for it.
+#[test]
+fn all_curvature_at_one_vertex_with_flips() {
+    let pretzel = Path::new("fixtures/good/genus-3-pretzel.obj");
+    let built = build(pretzel, &["cones.strategy=single"]);
+    verify(&built.atlas());
+    let document = document(&built.atlas());
+    assert_eq!(document["connectivity"]["splits"], 0);
+    assert_eq!(document["metric"]["scheme"], "vertex-scaling");
+    let flips = document["metric"]["flips"].as_u64();
+    assert!(flips.is_some_and(|n| n > 0), "{flips:?}");
+    let cones = document["cones"].as_array().expect("a list");
+    let curvature = cones[0]["curvature"].as_f64().expect("a number");
+    assert_eq!(cones.len(), 1);
+    assert!((curvature + 8.0 * std::f64::consts::PI).abs() < 1e-9);
+}
+
+#[test]
+fn boundary_vertices_that_cannot_be() {
+    let inside = "boundary.list=[{vertex=1100,curvature=\"1/2\"}]";
+    insta::assert_snapshot!(refusal("disk-mask.obj", &[inside]), @"");
+    let free = ["boundary.condition=free", inside];
+    insta::assert_snapshot!(refusal("disk-mask.obj", &free), @"");
+    let much = "boundary.list=[{point=[-99,0,0],curvature=1}]";
+    insta::assert_snapshot!(refusal("disk-mask.obj", &[much]), @"");
+    insta::assert_snapshot!(refusal("disk-mask.obj", &["boundary.condition=prescribed"]), @"");
 }
 
 /// The numbers of cones are those of the input file, also where repair renumbers.

@@ -6,8 +6,8 @@
 
 use super::spread::by_position;
 use super::{
-    BoundaryCondition, BoundaryParams, ConeError, GAUSS_BONNET_TOLERANCE, PiMultiple, RequestedCone,
-    Requests,
+    BoundaryCondition, BoundaryParams, ConeError, GAUSS_BONNET_TOLERANCE, PiMultiple,
+    RequestedCone, Requests,
 };
 use crate::geometry::connectivity::Topology;
 use crate::geometry::ids::{HalfedgeId, VertexId, VertexVec};

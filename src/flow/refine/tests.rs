@@ -2,6 +2,7 @@ use super::*;
 use crate::flow::cones::{
     BoundaryParams, ConeParams, ConeSpec, ConeStrategy, PiMultiple, assign, prescribe,
 };
+use crate::flow::ricci::Scheme;
 use crate::geometry::ids::NONE;
 use crate::geometry::mesh::{Soup, triangle_area};
 use crate::repair::assemble::doubled_edges;

@@ -24,7 +24,7 @@ pub(crate) mod shapes;
 #[cfg(test)]
 mod tests;
 
-pub use error::FlowError;
+pub use error::{FlowError, Method};
 
 use crate::flow::cones::{BoundaryCondition, Prescription};
 use crate::flow::feasibility::{self, Constraint};
@@ -47,7 +47,8 @@ pub struct FlowStep {
     pub energy: f64,
     /// Step length taken to come here; 1 is a full Newton step.
     pub step: f64,
-    /// Edges flipped to come here.
+    /// Edges flipped to come here. In the first line those that make the triangulation of the surface itself Delaunay; the lines
+    /// together count every flip.
     pub flips: usize,
     /// Σε for the gradient flow, the iteration for Newton.
     pub flow_time: f64,
@@ -281,7 +282,7 @@ impl Problem<'_> {
     /// The tolerance is met, but a further step would still change `u` by `change`.
     fn runaway(&self, iterations: usize, u: &VertexVec<f64>, change: f64) -> FlowError {
         FlowError::Runaway {
-            scheme: self.params.scheme,
+            method: self.method(None),
             iterations,
             range: newton::spread(u),
             change,
@@ -289,13 +290,30 @@ impl Problem<'_> {
     }
 
     fn failure(&self, iterations: usize, max_error: f64, broken: &[FaceId]) -> FlowError {
+        let (most, key) = match self.params.solver {
+            Solver::Newton => (self.params.max_newton_steps, "flow.max_newton_steps"),
+            Solver::Gradient => (self.params.max_gradient_steps, "flow.max_gradient_steps"),
+        };
+        // Faces of a flipped triangulation are not those of the surface.
+        let listed = match self.metric.may_flip() {
+            true => 0,
+            false => LISTED_FACES,
+        };
         FlowError::NotConverged {
-            scheme: self.params.scheme,
+            method: self.method((iterations >= most).then_some(key)),
             iterations,
             max_error,
             tolerance: self.params.curvature_tolerance,
             broken: broken.len(),
-            faces: broken.iter().copied().take(LISTED_FACES).collect(),
+            faces: broken.iter().copied().take(listed).collect(),
+        }
+    }
+
+    fn method(&self, out_of_steps: Option<&'static str>) -> Method {
+        Method {
+            scheme: self.params.scheme,
+            flips: self.metric.may_flip(),
+            out_of_steps,
         }
     }
 }
