@@ -29,7 +29,7 @@ fn a_cone_beyond_the_last_vertex() {
 fn a_cone_on_a_free_boundary() {
     // The point is far outside, so the nearest vertex lies on the rim.
     let list = "cones.list=[{point=[-99,0,0],curvature=\"1/2\"}]";
-    insta::assert_snapshot!(refusal("disk-mask.obj", &[list]), @r#"failed: disk-mask (prescription): vertex 1917 lies on a free boundary, where no curvature can be prescribed: move the cone inside or set boundary.condition = "uniform""#);
+    insta::assert_snapshot!(refusal("disk-mask.obj", &[list]), @"failed: disk-mask (prescription): vertex 1917 lies on a free boundary, where no curvature can be prescribed: move the cone inside, or give it in boundary.list");
 }
 
 #[test]
@@ -57,7 +57,7 @@ fn totals_that_miss_gauss_bonnet() {
 #[test]
 fn corners_where_there_is_no_disk() {
     let corners = "boundary.condition=corners";
-    insta::assert_snapshot!(refusal("three-boundaries-rabbit.ply", &[corners]), @r#"failed: three-boundaries-rabbit (prescription): boundary.condition = "corners" needs a disk (genus 0, 1 boundary loop), but the component has genus 0 and 3 boundary loops: use "free" or "uniform""#);
+    insta::assert_snapshot!(refusal("three-boundaries-rabbit.ply", &[corners]), @r#"failed: three-boundaries-rabbit (prescription): boundary.condition = "corners" needs a disk (genus 0, 1 boundary loop), but the component has genus 0 and 3 boundary loops: use "free", "uniform" or "prescribed""#);
 }
 
 /// (6) at one vertex: Φ ≡ 0 asks for enough faces around a strong cone, and repair may be forbidden.
@@ -109,12 +109,12 @@ fn all_curvature_at_one_vertex_with_flips() {
 #[test]
 fn boundary_vertices_that_cannot_be() {
     let inside = "boundary.list=[{vertex=1100,curvature=\"1/2\"}]";
-    insta::assert_snapshot!(refusal("disk-mask.obj", &[inside]), @"");
+    insta::assert_snapshot!(refusal("disk-mask.obj", &[inside]), @"failed: disk-mask (prescription): boundary.list names vertex 1100, which does not lie on the boundary: name a boundary vertex or a point");
     let free = ["boundary.condition=free", inside];
-    insta::assert_snapshot!(refusal("disk-mask.obj", &free), @"");
+    insta::assert_snapshot!(refusal("disk-mask.obj", &free), @r#"failed: disk-mask (prescription): boundary.list and boundary.condition = "free" exclude each other: remove one of them"#);
     let much = "boundary.list=[{point=[-99,0,0],curvature=1}]";
-    insta::assert_snapshot!(refusal("disk-mask.obj", &[much]), @"");
-    insta::assert_snapshot!(refusal("disk-mask.obj", &["boundary.condition=prescribed"]), @"");
+    insta::assert_snapshot!(refusal("disk-mask.obj", &[much]), @"failed: disk-mask (prescription): vertex 1917 has curvature 1π (3.141593 rad), but on the boundary it must be less than 1π (3.141593 rad), so that an angle remains: lower it or spread it over more cones");
+    insta::assert_snapshot!(refusal("disk-mask.obj", &["boundary.condition=prescribed"]), @r#"failed: disk-mask (prescription): boundary.condition is "prescribed", but boundary.list is empty: add boundary vertices or set the condition to "uniform""#);
 }
 
 /// The numbers of cones are those of the input file, also where repair renumbers.
