@@ -7,9 +7,9 @@
 //! Parameterizations* (section 5.1); equation and section numbers in these docs are the tutorial's.
 //!
 //! ```text
-//! read → repair → cones → connectivity repair → lengths → Ricci flow → cut → central chart → charts
-//!                                                                        ↓
-//!            write ← report ← geometry images ← patches ←────────────────┘
+//! read → repair → cones → connectivity repair → lengths → Ricci flow → overlay → cut → central chart → charts
+//!                                                                                  ↓
+//!                      write ← report ← geometry images ← patches ←────────────────┘
 //! ```
 //!
 //! Every arrow is a function from finished values to a finished value; [`job`] is the page on which they
@@ -51,6 +51,7 @@
 //! * D. X. Gu, F. Luo, S.-T. Yau. *Tutorial on Discrete Ricci Flow for Global Parameterizations.*
 //! * B. Chow, F. Luo. *Combinatorial Ricci flows on surfaces.* J. Differential Geom. 63, 2003.
 //! * X. D. Gu, F. Luo, J. Sun, T. Wu. *A discrete uniformization theorem for polyhedral surfaces.* J. Differential Geom. 109, 2018.
+//! * M. Gillespie, B. Springborn, K. Crane. *Discrete conformal equivalence of polyhedral surfaces.* ACM Trans. Graph. 40, 2021.
 //! * D. Glickenstein. *Discrete conformal variations and scalar curvature on piecewise flat manifolds.* J. Differential Geom. 87, 2011.
 //! * J. Erickson, K. Whittlesey. *Greedy optimal homotopy and homology generators.* SODA 2005.
 //! * X. Gu, S. Gortler, H. Hoppe. *Geometry images.* SIGGRAPH 2002.

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 /// A built component.
 #[derive(Clone, Debug)]
 pub struct AffineAtlas {
-    /// Surface after repair and connectivity repair.
+    /// Surface after repair and connectivity repair; where the flow flipped edges, refined by those of the flat triangulation.
     pub mesh: Mesh,
     /// Its counts.
     pub topology: Topology,

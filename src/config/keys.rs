@@ -127,6 +127,11 @@ const BOUNDARY_EXAMPLE: &str = "[{ vertex = 0, curvature = \"1/3\" }]";
 const CORNER_EXAMPLE: &str = "[{ vertex = 0 }, { vertex = 7 }, { vertex = 63 }, { vertex = 56 }]";
 /// Vertex indices are stored in 32 bits and 2³²−1 means "none".
 const MAX_INDEX: i64 = u32::MAX as i64 - 1;
+/// The number of a vertex of the input file.
+const VERTEX: Kind = Kind::Integer {
+    min: 0,
+    max: MAX_INDEX,
+};
 
 /// Every key, in the order of `config.toml`.
 pub const KEYS: &[Key] = &[
@@ -188,10 +193,7 @@ pub const KEYS: &[Key] = &[
     key("cones.list", Kind::Tables(CONE_EXAMPLE), "", "[]"),
     key(
         "cones.list[].vertex",
-        Kind::Integer {
-            min: 0,
-            max: MAX_INDEX,
-        },
+        VERTEX,
         "vertices of the input file, counted from 0",
         "absent",
     ),
@@ -219,10 +221,7 @@ pub const KEYS: &[Key] = &[
     ),
     key(
         "cones.vertex",
-        Kind::Integer {
-            min: 0,
-            max: MAX_INDEX,
-        },
+        VERTEX,
         "vertices of the input file, counted from 0",
         "absent",
     ),
@@ -236,10 +235,7 @@ pub const KEYS: &[Key] = &[
     key("boundary.list", Kind::Tables(BOUNDARY_EXAMPLE), "", "[]"),
     key(
         "boundary.list[].vertex",
-        Kind::Integer {
-            min: 0,
-            max: MAX_INDEX,
-        },
+        VERTEX,
         "vertices of the input file, counted from 0",
         "absent",
     ),
@@ -258,10 +254,7 @@ pub const KEYS: &[Key] = &[
     key("boundary.corners", Kind::Tables(CORNER_EXAMPLE), "", "[]"),
     key(
         "boundary.corners[].vertex",
-        Kind::Integer {
-            min: 0,
-            max: MAX_INDEX,
-        },
+        VERTEX,
         "vertices of the input file, counted from 0",
         "absent",
     ),

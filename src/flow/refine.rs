@@ -55,7 +55,7 @@ const MARGIN: f64 = 1.5;
 #[serde(default, deny_unknown_fields)]
 pub struct RefineParams {
     /// False leaves the connectivity as it is. Absent: true where the flow keeps the connectivity, false where it flips edges,
-    /// which then buys nothing; see [`is_enabled`](Self::is_enabled).
+    /// since it hardly buys anything there; see [`is_enabled`](Self::is_enabled).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub enabled: Option<bool>,
     /// Rings around each cone whose vertices get `ring_valence`, 0 to 3.

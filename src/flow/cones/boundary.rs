@@ -2,7 +2,8 @@
 //!
 //! Where single vertices are listed, the others share evenly what is left to meet Gauss–Bonnet (or the total of their loop): a
 //! polygon whose corners take all of it has straight sides, and one corner on a disk leaves the rest of the border round.
-//! Nothing need be counted by hand, and a total that is meant to leave nothing leaves exactly nothing.
+//! Nothing need be counted by hand, and a total that is meant to leave nothing leaves exactly nothing. On a component of which no
+//! vertex is listed all share alike.
 
 use super::spread::by_position;
 use super::{

@@ -19,12 +19,14 @@ mod existence;
 mod flipping;
 pub mod gradient;
 pub mod newton;
+mod params;
 #[cfg(test)]
 pub(crate) mod shapes;
 #[cfg(test)]
 mod tests;
 
 pub use error::{FlowError, Method};
+pub use params::{FlowParams, Scheme, Solver};
 
 use crate::flow::cones::{BoundaryCondition, Prescription};
 use crate::flow::feasibility::{self, Constraint};
@@ -83,73 +85,6 @@ pub struct FlatMetric {
     pub max_curvature_error: f64,
     /// Fit of the packing, for circle packings that have one.
     pub fit: Option<PackingFit>,
-}
-
-/// Which conformal structure turns `u` into lengths.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Scheme {
-    /// l = γi + γj (Φ ≡ 0).
-    Tangential,
-    /// (2) with Φ from (1).
-    Thurston,
-    /// l² = γi² + γj² + 2Iγiγj with the initial lengths exact.
-    InversiveDistance,
-    /// l = e^{(ui + uj)/2} l⁰.
-    #[default]
-    VertexScaling,
-}
-
-/// How the minimum of the energy is found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Solver {
-    /// Newton with line search.
-    #[default]
-    Newton,
-    /// (8) with adaptive step.
-    Gradient,
-}
-
-/// Parameters of the flow.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct FlowParams {
-    /// Conformal structure. `vertex-scaling` starts from the lengths in space and, with `delaunay`, always arrives. The packings are
-    /// the tutorial's and exist where (6) holds: `tangential` ignores the shape, `thurston` keeps the lengths as well as circles
-    /// can. `inversive-distance` keeps them exactly, but may meet broken triangles, as does `vertex-scaling` without `delaunay`.
-    pub scheme: Scheme,
-    /// With `vertex-scaling`: flip edges so that the triangulation is Delaunay at every `u`. Then a flat metric exists for every
-    /// prescription that meets Gauss–Bonnet with positive cone angles, on every mesh. The other schemes never flip.
-    pub delaunay: bool,
-    /// Minimiser. `newton` takes a handful of steps; `gradient` follows the flow itself, thousands of times slower on large meshes.
-    pub solver: Solver,
-    /// Bound on max |K − K̄|, radians; rounding reaches about 1e-14, so nothing below 1e-13 is sensible.
-    pub curvature_tolerance: f64,
-    /// Most Newton steps; 4 to 15 are usual.
-    pub max_newton_steps: usize,
-    /// Most gradient steps; their number grows with the number of vertices, some 1000 for a mesh of 100.
-    pub max_gradient_steps: usize,
-}
-
-impl Default for FlowParams {
-    fn default() -> Self {
-        Self {
-            scheme: Scheme::default(),
-            delaunay: true,
-            solver: Solver::default(),
-            curvature_tolerance: 1e-10,
-            max_newton_steps: 200,
-            max_gradient_steps: 1_000_000,
-        }
-    }
-}
-
-impl FlowParams {
-    /// Whether the flow flips edges.
-    pub fn flips(&self) -> bool {
-        self.scheme == Scheme::VertexScaling && self.delaunay
-    }
 }
 
 /// Bound on the difference between the total of K̄ and 2πχ, radians.
