@@ -168,7 +168,7 @@ fn case(mesh: Mesh, flips: usize, seed: u64) -> Case {
     for i in 0..flips {
         let mut e = EdgeId::new(random.below(flat.edge_count()));
         // Every other flip is near the mirror, if there is one.
-        let near = |e: EdgeId| flat.edge_vertices(e).into_iter().all(|v| on_mirror(v));
+        let near = |e: EdgeId| flat.edge_vertices(e).into_iter().all(on_mirror);
         for _ in 0..if i % 2 == 0 { 20 } else { 0 } {
             if near(e) {
                 break;

@@ -32,7 +32,8 @@ pub(crate) mod samples;
 mod tests;
 
 use crate::atlas::cut::CutGraph;
-use crate::atlas::develop::Development;
+use crate::atlas::develop::{Development, Unfolded};
+use crate::atlas::overlay::Layout;
 use crate::atlas::plane::Similarity;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, PatchId};
 use crate::geometry::mesh::Mesh;
@@ -172,7 +173,8 @@ impl PatchParams {
 /// Divides the central chart into patches, gives each an image size and a place in the packed square, and
 /// finds the seams.
 ///
-/// `length` holds the flat length of every edge, `development` the central chart of the disk that `cut` makes.
+/// `length` holds the flat length of every edge, `development` the central chart of the disk that `cut` makes, `under`
+/// the layout that carries them, where there is one: own coordinates of patches are developed from there.
 ///
 /// # Errors
 /// A parameter out of range, or coordinates and lengths that are not finite.
@@ -181,6 +183,7 @@ pub fn layout(
     length: &EdgeVec<f64>,
     cut: &CutGraph,
     development: &Development,
+    under: Option<(&Layout, &Unfolded)>,
     params: &PatchParams,
 ) -> Result<PatchLayout, PatchError> {
     params.validate()?;
@@ -195,7 +198,7 @@ pub fn layout(
             });
         }
     }
-    let slit = Slit::new(mesh, length, cut, development);
+    let slit = Slit::new(mesh, length, cut, development, under);
     let sets = segment::segment(&slit, params.log_scale_range);
     let mut face_patch = FaceVec::filled(PatchId::new(0), c.face_count());
     let mut uv = FaceVec::filled([[0.0; 2]; 3], c.face_count());
