@@ -5,6 +5,7 @@ use super::*;
 use crate::atlas::charts::chart;
 use crate::atlas::cut::cut;
 use crate::atlas::develop::{Development, develop};
+use crate::atlas::patches::own_development_error;
 use crate::flow::cones::BoundaryCondition;
 use crate::flow::correspondence::Correspondence;
 use crate::geometry::ids::{FaceId, HalfedgeVec, VertexId};
@@ -522,6 +523,9 @@ impl Case {
                 "face {f} in the plane"
             );
         }
+        let under = Some((layout, &unfolded));
+        let own = own_development_error(&o.mesh, &o.metric.length, &cut, &central, under);
+        assert!(own < 1e-12, "{own}");
         let segments = &cut.segments;
         assert_eq!(charts.gluings.len(), segments.len());
         for segment in segments {

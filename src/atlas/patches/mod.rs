@@ -38,6 +38,8 @@ use crate::atlas::plane::Similarity;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, PatchId};
 use crate::geometry::mesh::Mesh;
 use slit::Slit;
+#[cfg(test)]
+pub(crate) use slit::own_development_error;
 
 /// Most texels on a side of an image.
 pub const MAX_SIDE: usize = 8192;

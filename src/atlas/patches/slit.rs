@@ -213,6 +213,27 @@ impl<'a> Slit<'a> {
     }
 }
 
+/// Develops the whole disk from face 0 as a patch would be: the largest error of a side relative to the chart's diameter.
+#[cfg(test)]
+pub(crate) fn own_development_error(
+    mesh: &Mesh,
+    length: &EdgeVec<f64>,
+    cut: &CutGraph,
+    development: &Development,
+    under: Option<(&Layout, &Unfolded)>,
+) -> f64 {
+    let slit = Slit::new(mesh, length, cut, development, under);
+    let mut own = vec![[f64::NAN; 2]; development.copies];
+    slit.develop(FaceId::new(0), |_| true, &mut own);
+    let c = slit.connectivity;
+    c.halfedges().fold(0.0, |worst: f64, h| {
+        let [a, b] = [h, c.next(h)].map(|h| own[development.copy[h] as usize]);
+        let error = (plane::distance(a, b) - length[c.edge(h)]).abs();
+        assert!(error.is_finite());
+        worst.max(error / slit.diameter)
+    })
+}
+
 /// A triangulation slit along a cut, with its lengths.
 struct Disk<'a> {
     connectivity: &'a Connectivity,
