@@ -7,9 +7,9 @@
 //! Parameterizations* (section 5.1); equation and section numbers in these docs are the tutorial's.
 //!
 //! ```text
-//! read → repair → cones → connectivity repair → lengths → Ricci flow → cut → central chart → charts
-//!                                                                        ↓
-//!            write ← report ← geometry images ← patches ←────────────────┘
+//! read → repair → cones → connectivity repair → lengths → Ricci flow → overlay → cut → central chart → charts
+//!                                                                                  ↓
+//!                      write ← report ← geometry images ← patches ←────────────────┘
 //! ```
 //!
 //! Every arrow is a function from finished values to a finished value; [`job`] is the page on which they
