@@ -201,8 +201,8 @@ fn unknown_choice() {
     2 | scheme = "inversive"
       :          ^^^^^^^^^^^
       `----
-     help: did you mean "inversive-distance"? Allowed: "tangential", "thurston", "inversive-distance"
-           or "vertex-scaling"
+     help: did you mean "inversive-distance"? Allowed: "vertex-scaling", "tangential", "thurston" or
+           "inversive-distance"
     "#);
 }
 
@@ -278,8 +278,8 @@ fn bad_overrides() {
     1 | flow.scheme = "tangental"
       :               ^^^^^^^^^^^
       `----
-     help: did you mean "tangential"? Allowed: "tangential", "thurston", "inversive-distance" or
-           "vertex-scaling"
+     help: did you mean "tangential"? Allowed: "vertex-scaling", "tangential", "thurston" or
+           "inversive-distance"
     "#);
     insta::assert_snapshot!(set("flow.scheme"), @r"
     error: `--set flow.scheme` gives no value

@@ -123,6 +123,7 @@ const fn key(path: &'static str, kind: Kind, unit: &'static str, default: &'stat
 }
 
 const CONE_EXAMPLE: &str = "[{ vertex = 0, curvature = \"1/2\" }]";
+const BOUNDARY_EXAMPLE: &str = "[{ vertex = 0, curvature = \"1/3\" }]";
 const CORNER_EXAMPLE: &str = "[{ vertex = 0 }, { vertex = 7 }, { vertex = 63 }, { vertex = 56 }]";
 /// Vertex indices are stored in 32 bits and 2³²−1 means "none".
 const MAX_INDEX: i64 = u32::MAX as i64 - 1;
@@ -227,11 +228,33 @@ pub const KEYS: &[Key] = &[
     ),
     key(
         "boundary.condition",
-        Kind::Choice(&["free", "uniform", "corners"]),
+        Kind::Choice(&["free", "uniform", "corners", "prescribed"]),
         "",
         "absent",
     ),
     key("boundary.totals", Kind::Curvatures, "multiples of π", "[]"),
+    key("boundary.list", Kind::Tables(BOUNDARY_EXAMPLE), "", "[]"),
+    key(
+        "boundary.list[].vertex",
+        Kind::Integer {
+            min: 0,
+            max: MAX_INDEX,
+        },
+        "vertices of the input file, counted from 0",
+        "absent",
+    ),
+    key(
+        "boundary.list[].point",
+        Kind::Point,
+        "source units",
+        "absent",
+    ),
+    key(
+        "boundary.list[].curvature",
+        Kind::Curvature,
+        "multiples of π",
+        "required",
+    ),
     key("boundary.corners", Kind::Tables(CORNER_EXAMPLE), "", "[]"),
     key(
         "boundary.corners[].vertex",
@@ -248,7 +271,7 @@ pub const KEYS: &[Key] = &[
         "source units",
         "absent",
     ),
-    key("connectivity.enabled", Kind::Bool, "", "true"),
+    key("connectivity.enabled", Kind::Bool, "", "absent"),
     key(
         "connectivity.rings",
         Kind::Integer { min: 0, max: 3 },
@@ -270,14 +293,15 @@ pub const KEYS: &[Key] = &[
     key(
         "flow.scheme",
         Kind::Choice(&[
+            "vertex-scaling",
             "tangential",
             "thurston",
             "inversive-distance",
-            "vertex-scaling",
         ]),
         "",
-        "\"tangential\"",
+        "\"vertex-scaling\"",
     ),
+    key("flow.delaunay", Kind::Bool, "", "true"),
     key(
         "flow.solver",
         Kind::Choice(&["newton", "gradient"]),

@@ -81,9 +81,17 @@ fn commented_default_describes_every_key() {
         {
             let (parent, name) = key.path.rsplit_once('.').expect("section.key");
             let description = format!("# {}", key.describe());
-            // A key of listed tables has a paragraph of its own that begins with its name.
+            // A key of listed tables has a paragraph of its own that begins with its name and that of the table.
+            let table = match parent {
+                "cones.list[]" => "listed cone",
+                "boundary.list[]" => "listed boundary vertex",
+                "boundary.corners[]" => "corner",
+                _ => "",
+            };
             let here = if parent.ends_with("[]") {
-                **line == *description && lines[i - 1].starts_with(&format!("# {name} of a "))
+                let begins = format!("# {name} of a {table}: ");
+                assert!(!table.is_empty(), "{parent} has no name");
+                **line == *description && lines[i - 1].starts_with(&begins)
             } else {
                 let value = line.strip_prefix("# ").unwrap_or(line);
                 value.starts_with(&format!("{name} = ")) && lines[i - 1] == description
@@ -281,7 +289,7 @@ fn messages() {
         ),
         (
             "[flow]\nscheme = true",
-            "f:2:10: `flow.scheme` takes \"tangential\", \"thurston\", \"inversive-distance\" or \"vertex-scaling\", but was given true",
+            "f:2:10: `flow.scheme` takes \"vertex-scaling\", \"tangential\", \"thurston\" or \"inversive-distance\", but was given true",
             "",
         ),
         (

@@ -50,6 +50,9 @@ pub enum BoundaryCondition {
     Uniform,
     /// Four boundary vertices of a disk get π/2, the others 0: a rectangle.
     Corners,
+    /// Listed boundary vertices get the curvature listed; the others share evenly what Gauss–Bonnet (or the total of
+    /// their loop) leaves.
+    Prescribed,
 }
 
 /// A vertex whose prescribed curvature is not zero.
@@ -161,16 +164,33 @@ pub struct CornerSpec {
     pub point: Option<[f64; 3]>,
 }
 
+/// The curvature of a boundary vertex that the user names by vertex or by point.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoundarySpec {
+    /// Vertex of the input file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vertex: Option<u32>,
+    /// A point in source units: the nearest boundary vertex is taken.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub point: Option<[f64; 3]>,
+    /// K̄ in multiples of π, below 1; the interior angle there is π − K̄. 0 keeps the border straight there.
+    pub curvature: PiMultiple,
+}
+
 /// What happens on the boundary.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BoundaryParams {
-    /// Absent: `corners` where corners are named, `uniform` where totals are given, else `free`.
+    /// Absent: `corners` where corners are named, `prescribed` where there is a list, `uniform` where totals are given, else
+    /// `free`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub condition: Option<BoundaryCondition>,
-    /// For `uniform`: total curvature of each loop, in multiples of π, loops in the order of their first face in the file.
-    /// Empty: the same curvature at every boundary vertex.
+    /// For `uniform` and `prescribed`: total curvature of each loop, in multiples of π, loops in the order of their first face
+    /// in the file. Empty: what Gauss–Bonnet leaves, over all loops together.
     pub totals: Vec<PiMultiple>,
+    /// For `prescribed`: the curvature of single boundary vertices.
+    pub list: Vec<BoundarySpec>,
     /// For `corners`: four boundary vertices. Empty: four that divide the boundary's length best.
     pub corners: Vec<CornerSpec>,
 }
@@ -178,10 +198,16 @@ pub struct BoundaryParams {
 impl BoundaryParams {
     /// The condition on a component that has a boundary.
     pub fn effective_condition(&self) -> BoundaryCondition {
-        let implied = match (self.corners.is_empty(), self.totals.is_empty()) {
-            (false, _) => BoundaryCondition::Corners,
-            (true, false) => BoundaryCondition::Uniform,
-            (true, true) => BoundaryCondition::Free,
+        let given = (
+            self.corners.is_empty(),
+            self.list.is_empty(),
+            self.totals.is_empty(),
+        );
+        let implied = match given {
+            (false, _, _) => BoundaryCondition::Corners,
+            (true, false, _) => BoundaryCondition::Prescribed,
+            (true, true, false) => BoundaryCondition::Uniform,
+            (true, true, true) => BoundaryCondition::Free,
         };
         self.condition.unwrap_or(implied)
     }
@@ -201,30 +227,45 @@ pub fn prescribe(
         boundary.effective_condition()
     };
     let mut target = VertexVec::filled(0.0, mesh.connectivity.vertex_count());
-    let mut is_cone = VertexVec::filled(None, mesh.connectivity.vertex_count());
-    let on_boundary = boundary::prescribed_total(&topology, condition, boundary)?;
-    for cone in choose(mesh, &topology, requests, cones, on_boundary)? {
-        let v = cone.vertex;
-        let source = mesh.source_vertex[v];
-        if let Some(first) = is_cone[v].replace(cone.named) {
-            return Err(ConeError::Twice {
-                first,
-                second: cone.named,
-                vertex: source,
-            });
-        }
+    // By what name each vertex got its curvature.
+    let mut named = VertexVec::filled(None, mesh.connectivity.vertex_count());
+    let on_boundary = boundary::prescribed_total(&topology, requests, condition, boundary)?;
+    let chosen = choose(mesh, &topology, requests, cones, on_boundary)?;
+    for cone in &chosen {
         if cone.curvature == 0.0 {
             return Err(ConeError::ZeroCurvature { vertex: cone.named });
         }
-        if mesh.connectivity.is_boundary_vertex(v) && condition != BoundaryCondition::Uniform {
-            return Err(match condition {
-                BoundaryCondition::Corners => ConeError::OnCornerBoundary { vertex: cone.named },
-                _ => ConeError::OnFreeBoundary { vertex: cone.named },
+        if mesh.connectivity.is_boundary_vertex(cone.vertex) {
+            let vertex = cone.named;
+            match condition {
+                BoundaryCondition::Corners => return Err(ConeError::OnCornerBoundary { vertex }),
+                BoundaryCondition::Free => return Err(ConeError::OnFreeBoundary { vertex }),
+                BoundaryCondition::Uniform | BoundaryCondition::Prescribed => {}
+            }
+        }
+    }
+    for cone in chosen.iter().chain(boundary::listed(mesh, requests)?) {
+        let v = cone.vertex;
+        if let Some(first) = named[v].replace(cone.named) {
+            return Err(ConeError::Twice {
+                first,
+                second: cone.named,
+                vertex: mesh.source_vertex[v],
             });
         }
         target[v] = cone.curvature;
     }
-    boundary::prescribe(mesh, &topology, requests, condition, boundary, &mut target)?;
+    // Before the rest of the boundary, so that a message gives what the user wrote.
+    check_angles(mesh, &target)?;
+    boundary::prescribe(
+        mesh,
+        &topology,
+        requests,
+        condition,
+        boundary,
+        &named,
+        &mut target,
+    )?;
     check_angles(mesh, &target)?;
     check_total(mesh, &topology, condition, &mut target)?;
     Ok(Prescription::new(target, condition))

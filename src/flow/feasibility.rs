@@ -84,7 +84,7 @@ impl fmt::Display for Violation {
         };
         write!(
             f,
-            " must have {relation} than {:.9} of curvature by (6), but {:.9} is prescribed (radians); raise the valence there by connectivity repair, move the cones, or use the scheme `vertex-scaling`",
+            " must have {relation} than {:.9} of curvature by (6), but {:.9} is prescribed (radians); raise the valence there by connectivity repair, move the cones, or use the scheme `vertex-scaling` with flow.delaunay = true",
             self.bound, self.curvature
         )
     }

@@ -56,7 +56,7 @@ impl Packing {
 pub enum PackingError {
     /// Newton did not reach the minimum of (1).
     #[error(
-        "the circle packing nearest to the mesh was not found in {steps} steps (gradient {gradient:.1e}, bound {tolerance:.1e}); use the scheme `tangential` or `vertex-scaling`"
+        "the circle packing nearest to the mesh was not found in {steps} steps (gradient {gradient:.1e}, bound {tolerance:.1e}); use the scheme `vertex-scaling` with flow.delaunay = true, or `tangential`"
     )]
     NotConverged {
         /// Steps taken.

@@ -38,6 +38,7 @@ mod rings;
 pub use packable::make_packable;
 
 use crate::flow::cones::{BoundaryCondition, Prescription};
+use crate::flow::ricci::FlowParams;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeId, FaceId, HalfedgeId, VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
@@ -53,8 +54,10 @@ const MARGIN: f64 = 1.5;
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RefineParams {
-    /// False leaves the connectivity as it is.
-    pub enabled: bool,
+    /// False leaves the connectivity as it is. Absent: true where the flow keeps the connectivity, false where it flips edges,
+    /// which then buys nothing; see [`is_enabled`](Self::is_enabled).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub enabled: Option<bool>,
     /// Rings around each cone whose vertices get `ring_valence`, 0 to 3.
     pub rings: usize,
     /// Least valence of the vertices in those rings, 3 to 8.
@@ -67,7 +70,7 @@ pub struct RefineParams {
 impl Default for RefineParams {
     fn default() -> Self {
         Self {
-            enabled: true,
+            enabled: None,
             rings: 2,
             ring_valence: 6,
             flat_vertex_valence: 0,
@@ -113,16 +116,14 @@ pub enum RefineError {
     },
 }
 
-/// Splits edges around cones until the criteria of the module docs hold; does nothing where they hold already.
+/// Splits edges around cones until the criteria of the module docs hold; does nothing where they hold already. Whether it is
+/// wanted is for the caller to ask ([`RefineParams::is_enabled`]).
 pub fn refine(
     mesh: Mesh,
     prescription: Prescription,
     params: &RefineParams,
 ) -> Result<(Mesh, Prescription, ConnectivityRepair), RefineError> {
     params.check()?;
-    if !params.enabled {
-        return Ok((mesh, prescription, ConnectivityRepair::default()));
-    }
     let need: f64 = prescription
         .cones
         .iter()
@@ -206,6 +207,13 @@ fn raise_all(editor: &mut Editor, wanted: &BTreeMap<VertexId, usize>) -> Result<
 }
 
 impl RefineParams {
+    /// Whether connectivity is repaired before this flow. Packings exist only where (6) holds, and schemes that keep the
+    /// connectivity break fewer triangles for it. With flips a metric exists always, and splits hardly change its quality but
+    /// enlarge the overlay (benches/README.md has the figures).
+    pub fn is_enabled(&self, flow: &FlowParams) -> bool {
+        self.enabled.unwrap_or(!flow.flips())
+    }
+
     fn check(&self) -> Result<(), RefineError> {
         for (key, given, low, high) in [
             ("rings", self.rings, 0, 3),
@@ -337,7 +345,8 @@ impl Editor {
         Ok(())
     }
 
-    /// The result; new vertices on a uniform boundary take their share.
+    /// The result; new vertices on a uniform boundary take their share. Where single boundary vertices are prescribed, they keep
+    /// what they have, and the border is straight at a new vertex.
     fn finish(mut self) -> (Mesh, Prescription, ConnectivityRepair) {
         if self.boundary == BoundaryCondition::Uniform {
             self.share_uniform_curvature();

@@ -130,14 +130,14 @@ fn in_source(error: FlowError, mesh: &Mesh) -> FlowError {
             ..violation
         }),
         FlowError::NotConverged {
-            scheme,
+            method,
             iterations,
             max_error,
             tolerance,
             broken,
             faces,
         } => FlowError::NotConverged {
-            scheme,
+            method,
             iterations,
             max_error,
             tolerance,

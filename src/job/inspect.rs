@@ -64,7 +64,13 @@ pub fn inspect(path: &Path, config: &Config) -> Result<Inspection, BuildError> {
         };
         line(format!("  repair: {changes}"));
         match plan(component, &requests, config) {
-            Ok((mesh, prescription, repair)) => describe(&mesh, &prescription, &repair, &mut line),
+            Ok((mesh, prescription, repair)) => {
+                let repaired = config
+                    .connectivity
+                    .is_enabled(&config.flow)
+                    .then_some(&repair);
+                describe(&mesh, &prescription, repaired, &mut line);
+            }
             Err(error) => {
                 line(format!("  refused: {error}"));
                 failures.push(Failure::from(&error));
@@ -88,7 +94,7 @@ fn plan(
 fn describe(
     mesh: &Mesh,
     prescription: &Prescription,
-    repair: &ConnectivityRepair,
+    repair: Option<&ConnectivityRepair>,
     line: &mut impl FnMut(String),
 ) {
     let t = mesh.connectivity.topology();
@@ -98,9 +104,10 @@ fn describe(
         counted(t.boundary_loops, "boundary loop", "boundary loops"),
         t.euler_characteristic
     ));
-    line(match repair.splits {
-        0 => "  connectivity repair: nothing".to_owned(),
-        splits => format!(
+    line(match repair.map(|repair| repair.splits) {
+        None => "  connectivity repair: off".to_owned(),
+        Some(0) => "  connectivity repair: nothing".to_owned(),
+        Some(splits) => format!(
             "  connectivity repair: {}, then {} vertices and {} faces",
             counted(splits, "split", "splits"),
             t.vertices,

@@ -124,15 +124,18 @@ fn build_component(
     })
 }
 
-/// Connectivity repair (5.3): around cones, then wherever the scheme's packing could not exist.
+/// Connectivity repair (5.3) where the flow profits from it: around cones, then wherever the scheme's packing could not exist.
 fn refine_for(
     config: &Config,
     mesh: Mesh,
     prescription: Prescription,
 ) -> Result<(Mesh, Prescription, ConnectivityRepair), RefineError> {
     let params = &config.connectivity;
+    if !params.is_enabled(&config.flow) {
+        return Ok((mesh, prescription, ConnectivityRepair::default()));
+    }
     let (mesh, prescription, done) = refine::refine(mesh, prescription, params)?;
-    refine::make_packable(mesh, prescription, done, config.flow.scheme, params)
+    refine::make_packable(mesh, prescription, done, config.flow.scheme)
 }
 
 /// Length of every edge in space, source units.

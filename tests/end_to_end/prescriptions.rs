@@ -1,6 +1,6 @@
 //! Curvature that cannot be prescribed, as the configuration says it.
 
-use crate::command::{build, document};
+use crate::command::{build, document, verify};
 use std::path::Path;
 
 fn refusal(fixture: &str, settings: &[&str]) -> String {
@@ -29,7 +29,7 @@ fn a_cone_beyond_the_last_vertex() {
 fn a_cone_on_a_free_boundary() {
     // The point is far outside, so the nearest vertex lies on the rim.
     let list = "cones.list=[{point=[-99,0,0],curvature=\"1/2\"}]";
-    insta::assert_snapshot!(refusal("disk-mask.obj", &[list]), @r#"failed: disk-mask (prescription): vertex 1917 lies on a free boundary, where no curvature can be prescribed: move the cone inside or set boundary.condition = "uniform""#);
+    insta::assert_snapshot!(refusal("disk-mask.obj", &[list]), @"failed: disk-mask (prescription): vertex 1917 lies on a free boundary, where no curvature can be prescribed: move the cone inside, or give it in boundary.list");
 }
 
 #[test]
@@ -57,7 +57,7 @@ fn totals_that_miss_gauss_bonnet() {
 #[test]
 fn corners_where_there_is_no_disk() {
     let corners = "boundary.condition=corners";
-    insta::assert_snapshot!(refusal("three-boundaries-rabbit.ply", &[corners]), @r#"failed: three-boundaries-rabbit (prescription): boundary.condition = "corners" needs a disk (genus 0, 1 boundary loop), but the component has genus 0 and 3 boundary loops: use "free" or "uniform""#);
+    insta::assert_snapshot!(refusal("three-boundaries-rabbit.ply", &[corners]), @r#"failed: three-boundaries-rabbit (prescription): boundary.condition = "corners" needs a disk (genus 0, 1 boundary loop), but the component has genus 0 and 3 boundary loops: use "free", "uniform" or "prescribed""#);
 }
 
 /// (6) at one vertex: Φ ≡ 0 asks for enough faces around a strong cone, and repair may be forbidden.
@@ -78,10 +78,43 @@ fn a_packing_that_cannot_exist() {
 
 #[test]
 fn a_triangle_inequality_that_breaks_ends_without_an_atlas() {
-    let settings = ["cones.strategy=single", "flow.scheme=vertex-scaling"];
+    let settings = [
+        "cones.strategy=single",
+        "flow.scheme=vertex-scaling",
+        "flow.delaunay=false",
+    ];
     let message = refusal("genus-3-pretzel.obj", &settings);
     assert!(message.contains("(not_converged)"), "{message}");
     assert!(message.contains("face"), "{message}");
+    assert!(message.contains("flow.delaunay = true"), "{message}");
+}
+
+/// What breaks a packing or a triangle above has a solution with flips, and no split is needed for it.
+#[test]
+fn all_curvature_at_one_vertex_with_flips() {
+    let pretzel = Path::new("fixtures/good/genus-3-pretzel.obj");
+    let built = build(pretzel, &["cones.strategy=single"]);
+    verify(&built.atlas());
+    let document = document(&built.atlas());
+    assert_eq!(document["connectivity"]["splits"], 0);
+    assert_eq!(document["metric"]["scheme"], "vertex-scaling");
+    let flips = document["metric"]["flips"].as_u64();
+    assert!(flips.is_some_and(|n| n > 0), "{flips:?}");
+    let cones = document["cones"].as_array().expect("a list");
+    let curvature = cones[0]["curvature"].as_f64().expect("a number");
+    assert_eq!(cones.len(), 1);
+    assert!((curvature + 8.0 * std::f64::consts::PI).abs() < 1e-9);
+}
+
+#[test]
+fn boundary_vertices_that_cannot_be() {
+    let inside = "boundary.list=[{vertex=1100,curvature=\"1/2\"}]";
+    insta::assert_snapshot!(refusal("disk-mask.obj", &[inside]), @"failed: disk-mask (prescription): boundary.list names vertex 1100, which does not lie on the boundary: name a boundary vertex or a point");
+    let free = ["boundary.condition=free", inside];
+    insta::assert_snapshot!(refusal("disk-mask.obj", &free), @r#"failed: disk-mask (prescription): boundary.list and boundary.condition = "free" exclude each other: remove one of them"#);
+    let much = "boundary.list=[{point=[-99,0,0],curvature=1}]";
+    insta::assert_snapshot!(refusal("disk-mask.obj", &[much]), @"failed: disk-mask (prescription): vertex 1917 has curvature 1π (3.141593 rad), but on the boundary it must be less than 1π (3.141593 rad), so that an angle remains: lower it or spread it over more cones");
+    insta::assert_snapshot!(refusal("disk-mask.obj", &["boundary.condition=prescribed"]), @r#"failed: disk-mask (prescription): boundary.condition is "prescribed", but boundary.list is empty: add boundary vertices or set the condition to "uniform""#);
 }
 
 /// The numbers of cones are those of the input file, also where repair renumbers.

@@ -126,6 +126,8 @@ pub enum Boundary {
     Uniform,
     /// Four corners of π/2.
     Corners,
+    /// Vertex by vertex.
+    Prescribed,
 }
 
 /// The flat metric and how it was reached.

@@ -111,6 +111,7 @@ fn metric(atlas: &AffineAtlas) -> Metric {
         BoundaryCondition::Free => Boundary::Free,
         BoundaryCondition::Uniform => Boundary::Uniform,
         BoundaryCondition::Corners => Boundary::Corners,
+        BoundaryCondition::Prescribed => Boundary::Prescribed,
     };
     let history = &atlas.metric.history;
     Metric {

@@ -1,15 +1,23 @@
-//! Curvature on the boundary: none prescribed, the same everywhere, or the four corners of a rectangle.
+//! Curvature on the boundary: none prescribed, the same everywhere, the four corners of a rectangle, or vertex by vertex.
+//!
+//! Where single vertices are listed, the others share evenly what is left to meet Gauss–Bonnet (or the total of their loop): a
+//! polygon whose corners take all of it has straight sides, and one corner on a disk leaves the rest of the border round.
+//! Nothing need be counted by hand, and a total that is meant to leave nothing leaves exactly nothing.
 
 use super::spread::by_position;
-use super::{BoundaryCondition, BoundaryParams, ConeError, PiMultiple, Requests};
+use super::{
+    BoundaryCondition, BoundaryParams, ConeError, GAUSS_BONNET_TOLERANCE, PiMultiple,
+    RequestedCone, Requests,
+};
 use crate::geometry::connectivity::Topology;
 use crate::geometry::ids::{HalfedgeId, VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, distance};
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// The curvature that the boundary takes whatever the cones are, radians; also checks that the condition fits the surface.
 pub(super) fn prescribed_total(
     topology: &Topology,
+    requests: &Requests,
     condition: BoundaryCondition,
     params: &BoundaryParams,
 ) -> Result<f64, ConeError> {
@@ -22,25 +30,48 @@ pub(super) fn prescribed_total(
             })
         }
         BoundaryCondition::Corners => Ok(TAU),
-        BoundaryCondition::Uniform if ![0, loops].contains(&params.totals.len()) => {
+        BoundaryCondition::Uniform | BoundaryCondition::Prescribed
+            if ![0, loops].contains(&params.totals.len()) =>
+        {
             Err(ConeError::TotalsCount {
                 given: params.totals.len(),
                 loops,
             })
         }
-        BoundaryCondition::Uniform => Ok(params.totals.iter().map(|t| t.radians()).sum()),
+        BoundaryCondition::Prescribed if params.totals.is_empty() => {
+            Ok(requests.boundary.iter().map(|b| b.curvature).sum())
+        }
+        BoundaryCondition::Uniform | BoundaryCondition::Prescribed => {
+            Ok(params.totals.iter().map(|t| t.radians()).sum())
+        }
         BoundaryCondition::Free => Ok(0.0),
     }
 }
 
-/// Adds the curvature of the boundary to `target`, which holds the cones. A cone on a uniform boundary keeps its own
-/// curvature, and the others share what is left.
+/// The boundary vertices that got a curvature of their own; an error where one is not on the boundary.
+pub(super) fn listed<'a>(
+    mesh: &Mesh,
+    requests: &'a Requests,
+) -> Result<&'a [RequestedCone], ConeError> {
+    let inside = |b: &&RequestedCone| !mesh.connectivity.is_boundary_vertex(b.vertex);
+    match requests.boundary.iter().find(inside) {
+        Some(b) => Err(ConeError::NotOnBoundary {
+            key: "boundary.list",
+            vertex: b.named,
+        }),
+        None => Ok(&requests.boundary),
+    }
+}
+
+/// Adds the curvature of the boundary to `target`, which holds that of the vertices that are `named`. On a uniform or prescribed
+/// boundary those keep their own, and the others share what is left.
 pub(super) fn prescribe(
     mesh: &Mesh,
     topology: &Topology,
     requests: &Requests,
     condition: BoundaryCondition,
     params: &BoundaryParams,
+    named: &VertexVec<Option<u32>>,
     target: &mut VertexVec<f64>,
 ) -> Result<(), ConeError> {
     match condition {
@@ -51,7 +82,7 @@ pub(super) fn prescribe(
             }
             Ok(())
         }
-        BoundaryCondition::Uniform => {
+        BoundaryCondition::Uniform | BoundaryCondition::Prescribed => {
             let loops: Vec<Vec<VertexId>> = mesh
                 .connectivity
                 .boundary_loops()
@@ -72,24 +103,38 @@ pub(super) fn prescribe(
                 loops.into_iter().zip(totals).collect()
             };
             for (vertices, total) in groups {
-                share(&vertices, total, target);
+                share(&vertices, total, named, target)?;
             }
             Ok(())
         }
     }
 }
 
-/// Equal parts of what the total leaves to the vertices that have no curvature yet.
-fn share(vertices: &[VertexId], total: f64, target: &mut VertexVec<f64>) {
+/// Equal parts of what the total leaves to the vertices that are not named; nothing where only rounding is left.
+fn share(
+    vertices: &[VertexId],
+    total: f64,
+    named: &VertexVec<Option<u32>>,
+    target: &mut VertexVec<f64>,
+) -> Result<(), ConeError> {
     let listed: f64 = vertices.iter().map(|&v| target[v]).sum();
-    let free: Vec<VertexId> = vertices
-        .iter()
-        .copied()
-        .filter(|&v| target[v] == 0.0)
-        .collect();
-    for &v in &free {
-        target[v] = (total - listed) / free.len() as f64;
+    let others = vertices.iter().filter(|&&v| named[v].is_none()).count();
+    let rest = total - listed;
+    if others == 0 || rest.abs() <= GAUSS_BONNET_TOLERANCE {
+        return Ok(());
     }
+    let share = rest / others as f64;
+    if share >= PI - GAUSS_BONNET_TOLERANCE {
+        return Err(ConeError::RestTooLarge {
+            rest,
+            others,
+            share,
+        });
+    }
+    for &v in vertices.iter().filter(|&&v| named[v].is_none()) {
+        target[v] = share;
+    }
+    Ok(())
 }
 
 fn tails(mesh: &Mesh, chain: &[HalfedgeId]) -> Vec<VertexId> {
@@ -103,7 +148,10 @@ fn corners(mesh: &Mesh, requests: &Requests) -> Result<Vec<VertexId>, ConeError>
     }
     for (i, &(v, name)) in named.iter().enumerate() {
         if !mesh.connectivity.is_boundary_vertex(v) {
-            return Err(ConeError::CornerInside { vertex: name });
+            return Err(ConeError::NotOnBoundary {
+                key: "boundary.corners",
+                vertex: name,
+            });
         }
         if let Some(&(_, first)) = named[..i].iter().find(|(w, _)| *w == v) {
             return Err(ConeError::CornerTwice {

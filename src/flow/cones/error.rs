@@ -60,6 +60,11 @@ pub enum ConeError {
         "cones.strategy is \"listed\", but cones.list is empty: add cones or choose another strategy"
     )]
     EmptyList,
+    /// `prescribed` without a list.
+    #[error(
+        "boundary.condition is \"prescribed\", but boundary.list is empty: add boundary vertices or set the condition to \"uniform\""
+    )]
+    EmptyBoundaryList,
     /// `spread` of no cones.
     #[error("cones.count is 0: give at least 1 cone, or set cones.strategy = \"none\"")]
     NoCount,
@@ -83,7 +88,7 @@ pub enum ConeError {
     },
     /// A cone at a vertex whose curvature nobody prescribes.
     #[error(
-        "vertex {vertex} lies on a free boundary, where no curvature can be prescribed: move the cone inside or set boundary.condition = \"uniform\""
+        "vertex {vertex} lies on a free boundary, where no curvature can be prescribed: move the cone inside, or give it in boundary.list"
     )]
     OnFreeBoundary {
         /// Vertex.
@@ -91,7 +96,7 @@ pub enum ConeError {
     },
     /// A cone on the border of a rectangle.
     #[error(
-        "vertex {vertex} lies on the boundary, whose curvature boundary.condition = \"corners\" prescribes: move the cone inside or set the condition to \"uniform\""
+        "vertex {vertex} lies on the boundary, whose curvature boundary.condition = \"corners\" prescribes: move the cone inside, or give all curvature of the boundary in boundary.list"
     )]
     OnCornerBoundary {
         /// Vertex.
@@ -112,6 +117,20 @@ pub enum ConeError {
         bound: f64,
         /// Interior or boundary.
         place: &'static str,
+    },
+    /// The boundary vertices that are not named would have to turn by π or more.
+    #[error(
+        "{others} boundary vertices are left to share a curvature of {}, {} each ({share:.6} rad), but on the boundary it must be less than 1π (3.141593 rad), so that an angle remains: list more of it in boundary.list, or give the interior more",
+        in_pi(*rest),
+        in_pi(*share)
+    )]
+    RestTooLarge {
+        /// What they share, radians.
+        rest: f64,
+        /// How many they are.
+        others: usize,
+        /// K̄ of each, radians.
+        share: f64,
     },
     /// Fewer than three cones on a sphere.
     #[error(
@@ -202,7 +221,7 @@ pub enum ConeError {
     },
     /// `corners` on something that is no disk.
     #[error(
-        "boundary.condition = \"corners\" needs a disk (genus 0, 1 boundary loop), but the component has genus {genus} and {loops} boundary loops: use \"free\" or \"uniform\""
+        "boundary.condition = \"corners\" needs a disk (genus 0, 1 boundary loop), but the component has genus {genus} and {loops} boundary loops: use \"free\", \"uniform\" or \"prescribed\""
     )]
     NotADisk {
         /// Genus.
@@ -218,11 +237,13 @@ pub enum ConeError {
         /// Given.
         given: usize,
     },
-    /// A corner in the interior.
+    /// A vertex in the interior where one on the boundary is needed.
     #[error(
-        "boundary.corners names vertex {vertex}, which does not lie on the boundary: name a boundary vertex or a point"
+        "{key} names vertex {vertex}, which does not lie on the boundary: name a boundary vertex or a point"
     )]
-    CornerInside {
+    NotOnBoundary {
+        /// Where in the configuration.
+        key: &'static str,
         /// Vertex.
         vertex: u32,
     },

@@ -25,6 +25,8 @@ pub struct Requests {
     pub single: Option<VertexId>,
     /// Corners: vertex, and how the input names it.
     pub corners: Vec<(VertexId, u32)>,
+    /// Boundary vertices with a curvature of their own.
+    pub boundary: Vec<RequestedCone>,
 }
 
 /// Finds the component and vertex of everything that the user names: one [`Requests`] a component, in their order.
@@ -54,9 +56,20 @@ pub fn assign(
             requests[component].single = Some(vertex);
         }
     }
+    let on_boundary = |mesh: &Mesh, v| mesh.connectivity.is_boundary_vertex(v);
+    for (i, spec) in boundary.list.iter().enumerate() {
+        let key = format!("boundary.list[{i}]");
+        let place = find(repaired, &key, spec.vertex, spec.point, on_boundary)?;
+        if let Some((component, vertex, named)) = place {
+            requests[component].boundary.push(RequestedCone {
+                vertex,
+                named,
+                curvature: spec.curvature.radians(),
+            });
+        }
+    }
     for (i, spec) in boundary.corners.iter().enumerate() {
         let key = format!("boundary.corners[{i}]");
-        let on_boundary = |mesh: &Mesh, v| mesh.connectivity.is_boundary_vertex(v);
         let place = find(repaired, &key, spec.vertex, spec.point, on_boundary)?;
         if let Some((component, vertex, named)) = place {
             requests[component].corners.push((vertex, named));
@@ -89,8 +102,18 @@ fn check_keys(cones: &ConeParams, boundary: &BoundaryParams) -> Result<(), ConeE
     }
     let condition = boundary.effective_condition();
     let shown = format!("boundary.condition = \"{}\"", condition.name());
-    if !boundary.totals.is_empty() && condition != BoundaryCondition::Uniform {
+    let by_total = matches!(
+        condition,
+        BoundaryCondition::Uniform | BoundaryCondition::Prescribed
+    );
+    if !boundary.totals.is_empty() && !by_total {
         return conflict("boundary.totals", shown);
+    }
+    if !boundary.list.is_empty() && condition != BoundaryCondition::Prescribed {
+        return conflict("boundary.list", shown);
+    }
+    if boundary.list.is_empty() && condition == BoundaryCondition::Prescribed {
+        return Err(ConeError::EmptyBoundaryList);
     }
     if !boundary.corners.is_empty() && condition != BoundaryCondition::Corners {
         return conflict("boundary.corners", shown);
@@ -118,6 +141,7 @@ impl BoundaryCondition {
             BoundaryCondition::Free => "free",
             BoundaryCondition::Uniform => "uniform",
             BoundaryCondition::Corners => "corners",
+            BoundaryCondition::Prescribed => "prescribed",
         }
     }
 }

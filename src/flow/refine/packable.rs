@@ -6,7 +6,7 @@
 //! the links of those that break it are split, and the packing is fitted again.
 
 use super::cuts::{fill, shortages};
-use super::{Editor, RefineError, RefineParams};
+use super::{Editor, RefineError};
 use crate::flow::cones::Prescription;
 use crate::flow::packing;
 use crate::flow::ricci::Scheme;
@@ -21,17 +21,15 @@ const ROUNDS: usize = 16;
 /// for everywhere: strong cones have had more from [`refine`](super::refine).
 const MARGIN: f64 = 1.05;
 
-/// Splits edges until (6) holds for every set, as far as that helps; does nothing for schemes
-/// that are no circle packings and where connectivity repair is switched off.
+/// Splits edges until (6) holds for every set, as far as that helps; does nothing for schemes that are no circle packings.
 pub fn make_packable(
     mesh: Mesh,
     prescription: Prescription,
     done: ConnectivityRepair,
     scheme: Scheme,
-    params: &RefineParams,
 ) -> Result<(Mesh, Prescription, ConnectivityRepair), RefineError> {
     let is_packing = matches!(scheme, Scheme::Tangential | Scheme::Thurston);
-    if !(params.enabled && is_packing) {
+    if !is_packing {
         return Ok((mesh, prescription, done));
     }
     let mut editor = Editor::new(mesh, prescription, usize::MAX);

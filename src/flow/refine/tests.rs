@@ -2,6 +2,7 @@ use super::*;
 use crate::flow::cones::{
     BoundaryParams, ConeParams, ConeSpec, ConeStrategy, PiMultiple, assign, prescribe,
 };
+use crate::flow::ricci::Scheme;
 use crate::geometry::ids::NONE;
 use crate::geometry::mesh::{Soup, triangle_area};
 use crate::repair::assemble::doubled_edges;
@@ -202,14 +203,49 @@ fn nothing_happens_where_the_criteria_hold() {
         let (_, _, repair) = refined(&mesh, &targets(&mesh, free, &cones));
         assert_eq!(repair, ConnectivityRepair::default());
     }
-    let off = RefineParams {
-        enabled: false,
-        ..RefineParams::default()
-    };
-    let strong = targets(&mesh, free, &[(0, -8.0)]);
-    let (same, _, repair) = refine(mesh.clone(), strong, &off).unwrap();
-    assert_eq!(repair.splits, 0);
-    assert_eq!(same.connectivity, mesh.connectivity);
+}
+
+#[test]
+fn repair_is_for_flows_that_keep_the_connectivity_unless_it_is_asked_for() {
+    let schemes = [
+        (Scheme::Tangential, true, true),
+        (Scheme::Thurston, true, true),
+        (Scheme::InversiveDistance, true, true),
+        (Scheme::VertexScaling, false, true),
+        (Scheme::VertexScaling, true, false),
+    ];
+    for (scheme, delaunay, expected) in schemes {
+        let flow = FlowParams {
+            scheme,
+            delaunay,
+            ..FlowParams::default()
+        };
+        assert_eq!(RefineParams::default().is_enabled(&flow), expected);
+        for asked in [false, true] {
+            let params = RefineParams {
+                enabled: Some(asked),
+                ..RefineParams::default()
+            };
+            assert_eq!(params.is_enabled(&flow), asked);
+        }
+    }
+}
+
+/// What was prescribed vertex by vertex stays; a new boundary vertex is straight.
+#[test]
+fn a_split_prescribed_boundary_keeps_every_vertex() {
+    let triangle = mesh_of(&soup(
+        vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+        vec![[0, 1, 2]],
+    ));
+    let given = [(0, 2.0 / 3.0), (1, 2.0 / 3.0), (2, 2.0 / 3.0)];
+    let prescribed = targets(&triangle, BoundaryCondition::Prescribed, &given);
+    let (_, after, repair) =
+        raise_valence(triangle, prescribed.clone(), &[(VertexId::new(0), 3)]).unwrap();
+    assert_eq!(repair.splits, 1);
+    assert_eq!(after.boundary, BoundaryCondition::Prescribed);
+    assert_eq!(after.target.as_slice()[..3], *prescribed.target.as_slice());
+    assert_eq!(after.target.as_slice()[3..], [0.0]);
 }
 
 #[test]

@@ -64,10 +64,10 @@ pub enum FlowError {
     #[error(transparent)]
     Solve(#[from] SolveError),
     /// The minimum was not reached, or it has broken faces.
-    #[error("{}", not_converged_message(*.scheme, *.iterations, *.max_error, *.tolerance, *.broken, .faces))]
+    #[error("{}", not_converged_message(*.method, *.iterations, *.max_error, *.tolerance, *.broken, .faces))]
     NotConverged {
-        /// Which conformal structure.
-        scheme: Scheme,
+        /// What was tried.
+        method: Method,
         /// Steps taken.
         iterations: usize,
         /// max |K − K̄| where it ended, radians.
@@ -76,15 +76,15 @@ pub enum FlowError {
         tolerance: f64,
         /// Number of faces that break the triangle inequality there.
         broken: usize,
-        /// The first of them.
+        /// The first of them; none where edges were flipped, since those faces are not the surface's.
         faces: Vec<FaceId>,
     },
     /// The curvatures are met, but `u` runs away: a packing that (6) rules out by equality has curvatures that reach the target
     /// only in the limit.
-    #[error("{}", runaway_message(*.scheme, *.iterations, *.range, *.change))]
+    #[error("{}", runaway_message(*.method, *.iterations, *.range, *.change))]
     Runaway {
-        /// Which conformal structure.
-        scheme: Scheme,
+        /// What was tried.
+        method: Method,
         /// Steps taken.
         iterations: usize,
         /// Largest minus smallest `u` where it ended.
@@ -94,7 +94,7 @@ pub enum FlowError {
     },
     /// The flat metric exists, but its scales leave float64.
     #[error(
-        "the flat metric needs lengths that are scaled by factors more than e^{range:.0} apart (reached after {iterations} steps), which float64 does not hold; prescribe more cones of less curvature each, or leave the boundary free"
+        "the flat metric exists, but its lengths are scaled by factors more than e^{range:.0} apart (reached after {iterations} steps), and float64 holds numbers from e^-708 to e^709 only; spread the strongest cones' curvature over more vertices, or leave the boundary free"
     )]
     ScaleRange {
         /// Steps taken.
@@ -110,8 +110,19 @@ pub enum FlowError {
     Cancelled,
 }
 
+/// What was tried when a flow failed: the advice depends on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Method {
+    /// Which conformal structure.
+    pub scheme: Scheme,
+    /// Whether edges were flipped.
+    pub flips: bool,
+    /// The key of the configuration that bounds the number of steps, where that ended the flow.
+    pub out_of_steps: Option<&'static str>,
+}
+
 fn not_converged_message(
-    scheme: Scheme,
+    method: Method,
     iterations: usize,
     max_error: f64,
     tolerance: f64,
@@ -128,7 +139,12 @@ fn not_converged_message(
             "the flow did not converge: after {iterations} steps the largest curvature error is {max_error:.3e} (bound {tolerance:.1e})"
         ),
     };
-    if broken > 0 {
+    if broken > 0 && method.flips {
+        message += &format!(
+            "{} {broken} faces of the flipped triangulation break the triangle inequality",
+            if met { ", but" } else { " and" },
+        );
+    } else if broken > 0 {
         let listed: Vec<String> = faces.iter().map(FaceId::to_string).collect();
         let more = if broken > faces.len() { ", …" } else { "" };
         message += &format!(
@@ -137,11 +153,11 @@ fn not_converged_message(
             listed.join(", ")
         );
     }
-    message + remedy(scheme)
+    message + &remedy(method, broken)
 }
 
-fn runaway_message(scheme: Scheme, iterations: usize, range: f64, change: f64) -> String {
-    let what = match scheme {
+fn runaway_message(method: Method, iterations: usize, range: f64, change: f64) -> String {
+    let what = match method.scheme {
         Scheme::Tangential | Scheme::Thurston => {
             "circles drift apart in size without end: some region meets (6) with equality only"
         }
@@ -153,21 +169,37 @@ fn runaway_message(scheme: Scheme, iterations: usize, range: f64, change: f64) -
         true => format!("a further step would change that by {change:.1e}"),
         false => "the system has become singular".to_string(),
     };
+    let claim = match method.flips {
+        true => "the flow has not settled",
+        false => "the flow has no solution on this connectivity",
+    };
     format!(
-        "the flow has no solution on this connectivity: the curvatures are met after {iterations} steps, but the {what} (log scales differ by {range:.1}, and {still}){}",
-        remedy(scheme)
+        "{claim}: the curvatures are met after {iterations} steps, but the {what} (log scales differ by {range:.1}, and {still}){}",
+        remedy(method, 0)
     )
 }
 
-fn remedy(scheme: Scheme) -> &'static str {
-    match scheme {
-        Scheme::VertexScaling | Scheme::InversiveDistance => {
-            "; use the scheme `tangential`, which breaks no triangle, or remesh the needle faces there"
+/// What to change, as the end of a sentence.
+fn remedy(method: Method, broken: usize) -> String {
+    if let Some(key) = method.out_of_steps.filter(|_| broken == 0) {
+        return format!("; raise {key}");
+    }
+    match method.scheme {
+        // Gu, Luo, Sun, Wu 2018: only rounding can be in the way.
+        Scheme::VertexScaling if method.flips => {
+            "; a flat metric exists for these curvatures, but float64's 16 digits do not hold the angles of its thinnest faces: raise flow.curvature_tolerance, or spread the strongest cones' curvature over more vertices"
+        }
+        Scheme::VertexScaling => {
+            "; set flow.delaunay = true: with flips a solution exists always"
+        }
+        Scheme::InversiveDistance => {
+            "; use the scheme `vertex-scaling` with flow.delaunay = true: with flips a solution exists always"
         }
         Scheme::Tangential | Scheme::Thurston => {
-            "; raise the valence around the cones by connectivity repair, or spread the curvature over more cones"
+            "; raise the valence around the cones by connectivity repair, spread the curvature over more cones, or use the scheme `vertex-scaling` with flow.delaunay = true"
         }
     }
+    .to_string()
 }
 
 #[cfg(test)]
@@ -177,12 +209,61 @@ mod tests {
     #[test]
     fn no_message_gives_an_error_below_its_bound_as_the_reason() {
         let broken = [FaceId::new(4)];
-        let met = not_converged_message(Scheme::VertexScaling, 9, 1e-12, 1e-10, 1, &broken);
+        let fixed = method(Scheme::VertexScaling, false);
+        let met = not_converged_message(fixed, 9, 1e-12, 1e-10, 1, &broken);
         assert!(met.contains("the curvatures are met, but 1 faces break"));
         assert!(!met.contains("error"));
-        let missed = not_converged_message(Scheme::VertexScaling, 9, 1.5, 1e-10, 1, &broken);
+        let missed = not_converged_message(fixed, 9, 1.5, 1e-10, 1, &broken);
         assert!(missed.contains("error is 1.500e0 (bound 1.0e-10) and 1 faces break"));
-        let away = runaway_message(Scheme::Thurston, 44, 52.0, 1.0);
+        let away = runaway_message(method(Scheme::Thurston, false), 44, 52.0, 1.0);
         assert!(away.contains("(6) with equality only") && !away.contains("bound"));
+    }
+
+    fn method(scheme: Scheme, flips: bool) -> Method {
+        Method {
+            scheme,
+            flips,
+            out_of_steps: None,
+        }
+    }
+
+    #[test]
+    fn flips_are_the_remedy_where_there_were_none_and_only_there() {
+        for scheme in [
+            Scheme::Tangential,
+            Scheme::Thurston,
+            Scheme::InversiveDistance,
+            Scheme::VertexScaling,
+        ] {
+            let method = method(scheme, false);
+            for message in [
+                not_converged_message(method, 9, 1.5, 1e-10, 0, &[]),
+                runaway_message(method, 9, 52.0, 1.0),
+            ] {
+                assert!(message.contains("flow.delaunay = true"), "{message}");
+                assert!(!message.contains("`tangential`"), "{message}");
+            }
+        }
+        let flips = method(Scheme::VertexScaling, true);
+        for message in [
+            not_converged_message(flips, 9, 1.5e-9, 1e-10, 2, &[]),
+            runaway_message(flips, 9, 52.0, 1.0),
+        ] {
+            assert!(message.contains("a flat metric exists"), "{message}");
+            assert!(message.contains("float64's 16 digits"), "{message}");
+            for wrong in ["delaunay", "connectivity", "no solution", "(6)", "(faces"] {
+                assert!(!message.contains(wrong), "{wrong}: {message}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_flow_that_ran_out_of_steps_asks_for_more() {
+        let method = Method {
+            out_of_steps: Some("flow.max_newton_steps"),
+            ..method(Scheme::VertexScaling, true)
+        };
+        let message = not_converged_message(method, 2, 1.5, 1e-10, 0, &[]);
+        assert!(message.ends_with("; raise flow.max_newton_steps"));
     }
 }

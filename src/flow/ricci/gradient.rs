@@ -31,13 +31,16 @@ const RATE_WINDOW: usize = 64;
 const LONGEST_RECORD: usize = 4096;
 
 /// A record of bounded length whose lines are equally spaced in steps.
+///
+/// Until it is finished, `flips` of a line counts all flips so far: those of a dropped line then belong to the next.
 struct Record {
     lines: Vec<FlowStep>,
     stride: usize,
 }
 
 impl Record {
-    fn push(&mut self, line: FlowStep) {
+    fn push(&mut self, mut line: FlowStep, flips: usize) {
+        line.flips = flips;
         if !line.iteration.is_multiple_of(self.stride) {
             return;
         }
@@ -51,9 +54,14 @@ impl Record {
         }
     }
 
-    fn finish(mut self, last: FlowStep) -> Vec<FlowStep> {
+    fn finish(mut self, mut last: FlowStep, flips: usize) -> Vec<FlowStep> {
         if self.lines.last().map(|l| l.iteration) != Some(last.iteration) {
+            last.flips = flips;
             self.lines.push(last);
+        }
+        let mut before = 0;
+        for line in &mut self.lines {
+            (before, line.flips) = (line.flips, line.flips - before);
         }
         self.lines
     }
@@ -67,13 +75,15 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
     problem.metric.evaluate(&u, &mut now);
     let mut line = FlowStep {
         max_error: problem.max_error(&now),
+        flips: problem.metric.flips(),
         ..FlowStep::default()
     };
     let mut flips = problem.metric.flips();
     let mut record = Record {
-        lines: vec![line],
+        lines: Vec::new(),
         stride: 1,
     };
+    record.push(line, flips);
     problem.observer.flow_step(&line);
     let mut residual = problem.residual(&now);
     let mut weight = problem.metric.edge_weights(&now);
@@ -160,7 +170,7 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
         line.flow_time += epsilon;
         line.flips = problem.metric.flips() - flips;
         flips = problem.metric.flips();
-        record.push(line);
+        record.push(line, flips);
         problem.observer.flow_step(&line);
         if line.iteration.is_multiple_of(RATE_WINDOW) {
             rate = Some((window.1 / line.max_error).ln() / (line.flow_time - window.0));
@@ -173,7 +183,7 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
     Ok(Solution {
         u,
         evaluation: now,
-        history: record.finish(line),
+        history: record.finish(line, problem.metric.flips()),
     })
 }
 

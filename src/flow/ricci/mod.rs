@@ -7,8 +7,9 @@
 //! the constant is chosen so that the flat area is the source area. Where the boundary is free, `u` keeps its start
 //! there and nothing is normalised (5.2).
 //!
-//! *Guaranteed:* max |K − K̄| within the tolerance, every face a triangle in float64, or an error. *Not
-//! guaranteed:* that a scheme has a solution. A packing that exists (6) is always found; vertex scaling and inversive distance on
+//! *Guaranteed:* max |K − K̄| within the tolerance, every face a triangle in float64, or an error. Vertex scaling with flips, the
+//! default, has a solution for every prescription that meets Gauss–Bonnet with positive cone angles, as far as float64 reaches.
+//! *Not guaranteed:* that another scheme has one. A packing that exists (6) is always found; vertex scaling and inversive distance on
 //! a fixed connectivity may have none, and then the extended energy may even reach the tolerance with broken
 //! faces: that ends in [`FlowError::NotConverged`], never in a metric.
 
@@ -23,7 +24,7 @@ pub(crate) mod shapes;
 #[cfg(test)]
 mod tests;
 
-pub use error::FlowError;
+pub use error::{FlowError, Method};
 
 use crate::flow::cones::{BoundaryCondition, Prescription};
 use crate::flow::feasibility::{self, Constraint};
@@ -46,7 +47,8 @@ pub struct FlowStep {
     pub energy: f64,
     /// Step length taken to come here; 1 is a full Newton step.
     pub step: f64,
-    /// Edges flipped to come here.
+    /// Edges flipped to come here. In the first line those that make the triangulation of the surface itself Delaunay; the lines
+    /// together count every flip.
     pub flips: usize,
     /// Σε for the gradient flow, the iteration for Newton.
     pub flow_time: f64,
@@ -88,13 +90,13 @@ pub struct FlatMetric {
 #[serde(rename_all = "kebab-case")]
 pub enum Scheme {
     /// l = γi + γj (Φ ≡ 0).
-    #[default]
     Tangential,
     /// (2) with Φ from (1).
     Thurston,
     /// l² = γi² + γj² + 2Iγiγj with the initial lengths exact.
     InversiveDistance,
     /// l = e^{(ui + uj)/2} l⁰.
+    #[default]
     VertexScaling,
 }
 
@@ -113,9 +115,9 @@ pub enum Solver {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FlowParams {
-    /// Conformal structure. `tangential` breaks no triangle and exists on nearly every mesh, but ignores the shape; `thurston` keeps the
-    /// lengths in space as well as circles can; `inversive-distance` and `vertex-scaling` keep them exactly, but may
-    /// meet broken triangles.
+    /// Conformal structure. `vertex-scaling` starts from the lengths in space and, with `delaunay`, always arrives. The packings are
+    /// the tutorial's and exist where (6) holds: `tangential` ignores the shape, `thurston` keeps the lengths as well as circles
+    /// can. `inversive-distance` keeps them exactly, but may meet broken triangles, as does `vertex-scaling` without `delaunay`.
     pub scheme: Scheme,
     /// With `vertex-scaling`: flip edges so that the triangulation is Delaunay at every `u`. Then a flat metric exists for every
     /// prescription that meets Gauss–Bonnet with positive cone angles, on every mesh. The other schemes never flip.
@@ -140,6 +142,13 @@ impl Default for FlowParams {
             max_newton_steps: 200,
             max_gradient_steps: 1_000_000,
         }
+    }
+}
+
+impl FlowParams {
+    /// Whether the flow flips edges.
+    pub fn flips(&self) -> bool {
+        self.scheme == Scheme::VertexScaling && self.delaunay
     }
 }
 
@@ -273,7 +282,7 @@ impl Problem<'_> {
     /// The tolerance is met, but a further step would still change `u` by `change`.
     fn runaway(&self, iterations: usize, u: &VertexVec<f64>, change: f64) -> FlowError {
         FlowError::Runaway {
-            scheme: self.params.scheme,
+            method: self.method(None),
             iterations,
             range: newton::spread(u),
             change,
@@ -281,13 +290,30 @@ impl Problem<'_> {
     }
 
     fn failure(&self, iterations: usize, max_error: f64, broken: &[FaceId]) -> FlowError {
+        let (most, key) = match self.params.solver {
+            Solver::Newton => (self.params.max_newton_steps, "flow.max_newton_steps"),
+            Solver::Gradient => (self.params.max_gradient_steps, "flow.max_gradient_steps"),
+        };
+        // Faces of a flipped triangulation are not those of the surface.
+        let listed = match self.metric.may_flip() {
+            true => 0,
+            false => LISTED_FACES,
+        };
         FlowError::NotConverged {
-            scheme: self.params.scheme,
+            method: self.method((iterations >= most).then_some(key)),
             iterations,
             max_error,
             tolerance: self.params.curvature_tolerance,
             broken: broken.len(),
-            faces: broken.iter().copied().take(LISTED_FACES).collect(),
+            faces: broken.iter().copied().take(listed).collect(),
+        }
+    }
+
+    fn method(&self, out_of_steps: Option<&'static str>) -> Method {
+        Method {
+            scheme: self.params.scheme,
+            flips: self.metric.may_flip(),
+            out_of_steps,
         }
     }
 }
@@ -335,7 +361,7 @@ pub fn flow(
         let share = (required - prescribed) / target.len().max(1) as f64;
         target.as_mut_slice().iter_mut().for_each(|k| *k += share);
     }
-    if params.scheme == Scheme::VertexScaling && params.delaunay {
+    if params.flips() {
         let surface = flipping::Surface {
             connectivity,
             source_length,

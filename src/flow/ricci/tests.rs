@@ -372,8 +372,12 @@ fn bad_input_is_refused_with_both_numbers() {
         assert!(matches!(error, FlowError::BadTarget { vertex, .. } if vertex == VertexId::new(3)));
     }
     let infeasible = shape.prescribe(&[(3, -4.0 * PI), (9, PI), (17, PI), (33, PI), (50, PI)]);
-    let error = refuse(&shape.length, &infeasible);
+    let error = run(&shape, &infeasible, Scheme::Tangential).unwrap_err();
     assert!(error.to_string().contains("vertex 3 must have more than"));
+    // (6) concerns packings only.
+    let params = FlowParams::default();
+    let (c, length) = (&shape.connectivity, &shape.length);
+    assert!(flow(c, length, &infeasible, &params, &()).is_ok());
 }
 
 #[test]
@@ -388,8 +392,43 @@ fn broken_triangles_end_in_an_error_that_names_them() {
         };
         assert!(*broken > 0 && !faces.is_empty());
         assert!(error.to_string().contains("break the triangle inequality"));
-        assert!(error.to_string().contains("use the scheme `tangential`"));
+        assert!(error.to_string().contains("flow.delaunay = true"));
     }
+}
+
+/// The record begins with the Euclidean flips of the surface itself, and its lines together count every flip.
+#[test]
+fn flips_are_recorded_from_the_first_to_the_last() {
+    use crate::flow::correspondence::Correspondence;
+    use crate::flow::delaunay::Delaunay;
+    let mut most = [0, 0];
+    for shape in [
+        shapes::plate(2, 1),
+        shapes::torus(5, 4),
+        shapes::plate(0, 1),
+    ] {
+        let c = &shape.connectivity;
+        let identity = vec![Correspondence::identity(c)];
+        let mut delaunay = Delaunay::new(c.clone(), &shape.length, identity);
+        delaunay.flip_in_the_surface();
+        let prescription = shape.prescribe_default();
+        for solver in [Solver::Newton, Solver::Gradient] {
+            let params = FlowParams {
+                solver,
+                ..FlowParams::default()
+            };
+            assert!(params.flips());
+            let flat = flow(c, &shape.length, &prescription, &params, &()).unwrap();
+            assert_eq!(flat.history[0].flips, delaunay.flips, "{}", shape.name);
+            let total: usize = flat.history.iter().map(|step| step.flips).sum();
+            assert!(total >= delaunay.flips);
+            most = [
+                most[0].max(delaunay.flips),
+                most[1].max(total - delaunay.flips),
+            ];
+        }
+    }
+    assert!(most.iter().all(|&m| m > 0), "{most:?}");
 }
 
 #[test]
