@@ -41,7 +41,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         named
     };
     for mesh in meshes {
-        let runs = (0..3).map(|_| measure(&mesh));
+        let runs = (0..std::env::var("RUNS")
+            .ok()
+            .and_then(|r| r.parse().ok())
+            .unwrap_or(3))
+            .map(|_| measure(&mesh));
         let runs = runs.collect::<Result<Vec<_>, _>>()?;
         let total = |run: &Vec<(&str, f64)>| run.iter().map(|s| s.1).sum::<f64>();
         let Some(best) = runs
@@ -65,16 +69,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// Builds once into a temporary folder; stages in order with their seconds.
 fn measure(mesh: &Path) -> Result<Vec<(&'static str, f64)>, Box<dyn std::error::Error>> {
     let folder = tempfile::tempdir()?;
+    let mut config = Config::default();
+    config.flow.scheme = affine_atlas::flow::ricci::Scheme::VertexScaling;
     let watch = Stopwatch::default();
     let given = mesh.to_string_lossy();
-    let outcome = job::run(
-        mesh,
-        &given,
-        folder.path(),
-        "mesh",
-        &Config::default(),
-        &watch,
-    );
+    let outcome = job::run(mesh, &given, folder.path(), "mesh", &config, &watch);
     let end = Instant::now();
     if let AssetState::Failed(failure) = outcome.state {
         return Err(failure.message.into());

@@ -345,6 +345,7 @@ mod tests {
             &sample.length,
             &sample.cut,
             &sample.development,
+            None,
             &PatchParams::default(),
         )
         .unwrap();
@@ -426,7 +427,7 @@ mod tests {
             texel_budget: 10_000,
             ..PatchParams::default()
         };
-        let layout = layout(&s.mesh, &s.length, &s.cut, &s.development, &params).unwrap();
+        let layout = layout(&s.mesh, &s.length, &s.cut, &s.development, None, &params).unwrap();
         let images = sample(&s.mesh, &layout, &s.log_scale, [0.0; 3]);
         let c = &s.mesh.connectivity;
         let mut located = 0;

@@ -298,3 +298,212 @@ fn cosine(side: [f64; 3], corner: usize) -> f64 {
     let ratio = (a - b).exp();
     0.5 * (ratio + 1.0 / ratio) - 0.5 * (2.0 * side[corner] - a - b).exp()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::metric::{Evaluation, Metric, curvature, total_area};
+    use crate::flow::ricci::shapes;
+    use crate::geometry::ids::VertexId;
+
+    /// Faces glued along equal letters; a capital runs the other way. All corners are glued as they must be.
+    fn glued(words: &[&str]) -> Connectivity {
+        let sides: Vec<char> = words.iter().flat_map(|w| w.chars()).collect();
+        let twin: Vec<Option<HalfedgeId>> = sides
+            .iter()
+            .enumerate()
+            .map(|(h, s)| {
+                let other = |o: char| o != *s && o.eq_ignore_ascii_case(s);
+                let t = (0..sides.len()).find(|&t| t != h && other(sides[t]));
+                t.map(HalfedgeId::new)
+            })
+            .collect();
+        // Corners around a vertex by walking.
+        let mut tail = vec![usize::MAX; sides.len()];
+        let mut vertices = 0;
+        for start in 0..sides.len() {
+            let mut h = start;
+            while tail[h] == usize::MAX {
+                tail[h] = vertices;
+                let prev = h - h % 3 + (h % 3 + 2) % 3;
+                h = twin[prev].unwrap().index();
+            }
+            if tail[start] == vertices {
+                vertices += 1;
+            }
+        }
+        let tail: Vec<VertexId> = tail.into_iter().map(VertexId::new).collect();
+        Connectivity::from_gluing(tail.into(), &twin, vertices).unwrap()
+    }
+
+    /// One-vertex torus, double of a triangle, a pillow of two self-glued faces (degree-1 vertices), one-vertex genus 2.
+    fn tiny() -> Vec<(&'static str, Connectivity)> {
+        vec![
+            ("one-vertex torus", glued(&["abc", "ABC"])),
+            ("double of a triangle", glued(&["abc", "CBA"])),
+            ("two-triangle sphere", glued(&["aAb", "BcC"])),
+            (
+                "one-vertex genus 2",
+                glued(&["abx", "XAy", "YBz", "ZcW", "wdv", "VCD"]),
+            ),
+        ]
+    }
+
+    /// Lengths between 1 and 2 make triangles of any three… but for a sum of two that is just 2: stay below.
+    fn lengths(c: &Connectivity, random: &mut impl FnMut() -> f64) -> EdgeVec<f64> {
+        c.edges().map(|_| 1.0 + 0.9 * random()).collect()
+    }
+
+    fn assert_delaunay(delaunay: &Delaunay, u: &VertexVec<f64>) {
+        let c = &delaunay.connectivity;
+        c.validate().unwrap();
+        for e in c.edges() {
+            let h = c.edge_halfedge(e);
+            let t = c.twin(h).unwrap();
+            let cosine = |h| cosine(delaunay.log_sides(u, c.face(h)), (c.corner(h) + 2) % 3);
+            assert!(c.face(h) == c.face(t) || cosine(h) + cosine(t) > -1e-6);
+        }
+    }
+
+    #[test]
+    fn every_scale_of_the_tiniest_surfaces_has_triangles() {
+        let mut random = shapes::sequence(23);
+        for (name, c) in tiny() {
+            let chi = c.topology().euler_characteristic as f64;
+            for _ in 0..40 {
+                let length = lengths(&c, &mut random);
+                let mut delaunay = Delaunay::new(c.clone(), &length, Vec::new());
+                delaunay.flip_in_the_surface();
+                for range in [1.0, 10.0, 300.0] {
+                    let u = c
+                        .vertices()
+                        .map(|_| range * (2.0 * random() - 1.0))
+                        .collect();
+                    let mut shape = FaceVec::default();
+                    delaunay.evaluate(&u, &mut shape);
+                    assert_delaunay(&delaunay, &u);
+                    let angles: f64 = shape.iter().flat_map(|s| s.angle).sum();
+                    assert!(shape.iter().all(|s| !s.broken), "{name} at ±{range}");
+                    let total = 2.0 * PI * c.vertex_count() as f64 - angles;
+                    assert!((total - 2.0 * PI * chi).abs() < 1e-9, "{name}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn flips_in_the_surface_keep_curvature_and_area() {
+        let mut random = shapes::sequence(29);
+        let tiny = tiny().into_iter().map(|(_, c)| {
+            let length = lengths(&c, &mut random);
+            (c, length)
+        });
+        let real = shapes::small()
+            .into_iter()
+            .filter(|s| s.connectivity.is_closed());
+        let real = real.map(|s| (s.connectivity, s.length));
+        let mut flips = 0;
+        for (c, length) in tiny.chain(real).collect::<Vec<_>>() {
+            let mut delaunay = Delaunay::new(c.clone(), &length, Vec::new());
+            delaunay.flip_in_the_surface();
+            flips += delaunay.flips;
+            let after: EdgeVec<f64> = delaunay.log_lengths().iter().map(|l| l.exp()).collect();
+            let before = curvature(&c, &length).unwrap();
+            let now = curvature(&delaunay.connectivity, &after).unwrap();
+            for (a, b) in before.iter().zip(now.iter()) {
+                assert!((a - b).abs() < 1e-11);
+            }
+            let areas = [
+                total_area(&c, &length),
+                total_area(&delaunay.connectivity, &after),
+            ];
+            assert!((areas[0] / areas[1] - 1.0).abs() < 1e-12);
+            assert_delaunay(&delaunay, &VertexVec::filled(0.0, c.vertex_count()));
+        }
+        assert!(flips > 20);
+    }
+
+    #[test]
+    fn curvature_depends_on_u_alone_and_not_on_the_way_there() {
+        let mut random = shapes::sequence(31);
+        for shape in shapes::small() {
+            if !shape.connectivity.is_closed() {
+                continue;
+            }
+            let mut delaunay = Delaunay::new(shape.connectivity, &shape.length, Vec::new());
+            delaunay.flip_in_the_surface();
+            let mut direct = Metric::flipping(delaunay.clone());
+            let mut roundabout = Metric::flipping(delaunay);
+            let n = direct.connectivity().vertex_count();
+            let mut random_u = |range: f64| -> VertexVec<f64> {
+                (0..n).map(|_| range * (2.0 * random() - 1.0)).collect()
+            };
+            let goal = random_u(2.0);
+            let (mut one, mut other) = (Evaluation::default(), Evaluation::default());
+            direct.evaluate(&goal, &mut one);
+            for range in [1.0, 5.0, 20.0] {
+                roundabout.evaluate(&random_u(range), &mut other);
+            }
+            // Half of the way taken into the lengths.
+            let mut half: VertexVec<f64> = goal.iter().map(|u| 0.5 * u).collect();
+            roundabout.rebase(&mut half);
+            let rest = goal.iter().map(|u| 0.5 * u).collect();
+            roundabout.evaluate(&rest, &mut other);
+            assert!(roundabout.flips() > direct.flips());
+            for (a, b) in one.curvature.iter().zip(other.curvature.iter()) {
+                assert!((a - b).abs() < 1e-10, "{a} against {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn hessian_with_flips_agrees_with_finite_differences() {
+        let shape = shapes::torus(9, 7);
+        let mut delaunay = Delaunay::new(shape.connectivity, &shape.length, Vec::new());
+        delaunay.flip_in_the_surface();
+        let mut metric = Metric::flipping(delaunay);
+        let n = metric.connectivity().vertex_count();
+        let mut random = shapes::sequence(37);
+        let u: VertexVec<f64> = (0..n).map(|_| 2.0 * random() - 1.0).collect();
+        let (mut up, mut down, mut now) = Default::default();
+        for v in (0..n).step_by(5).map(VertexId::new) {
+            let h = 1e-5;
+            let mut moved = u.clone();
+            moved[v] += h;
+            metric.evaluate(&moved, &mut up);
+            moved[v] -= 2.0 * h;
+            metric.evaluate(&moved, &mut down);
+            metric.evaluate(&u, &mut now);
+            let weight = metric.edge_weights(&now);
+            let mut unit = VertexVec::filled(0.0, n);
+            unit[v] = 1.0;
+            let exact = metric.apply_hessian(&weight, &unit);
+            let scale = exact.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            let _: &Evaluation = &now;
+            for (w, entry) in exact.enumerate() {
+                let difference = (up.curvature[w] - down.curvature[w]) / (2.0 * h);
+                assert!(
+                    (entry - difference).abs() < 1e-5 * scale,
+                    "{entry} against {difference}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn ptolemy_on_a_cocircular_quad_is_the_distance() {
+        // Four points on a circle; both rules agree there.
+        let points = [0.3_f64, 1.9, 3.0, 5.1].map(|t| [t.cos(), t.sin()]);
+        let distance = |i: usize, j: usize| {
+            let ([a, b], [c, d]) = (points[i], points[j]);
+            (a - c).hypot(b - d).ln()
+        };
+        let by_rule = log_sum(
+            distance(0, 1) + distance(2, 3),
+            distance(1, 2) + distance(3, 0),
+        ) - distance(0, 2);
+        assert!((by_rule - distance(1, 3)).abs() < 1e-14);
+        assert_eq!(log_sum(700.0, -700.0), 700.0);
+        assert!((log_sum(900.0, 900.0) - 900.0 - 2.0_f64.ln()).abs() < 1e-12);
+    }
+}

@@ -21,7 +21,6 @@ pub struct Doubled {
 impl Doubled {
     /// The double; a closed surface stays as it is.
     pub fn new(surface: &Connectivity) -> Result<Self, ConnectivityError> {
-        let vertices = surface.vertex_count();
         if surface.is_closed() {
             return Ok(Self {
                 connectivity: surface.clone(),
@@ -50,10 +49,6 @@ impl Doubled {
                 None => h,
             }));
         }
-        debug_assert_eq!(
-            original.len() - vertices,
-            image.iter().filter(|v| v.index() >= vertices).count()
-        );
         Ok(Self {
             connectivity: Connectivity::from_gluing(tail, &twin, original.len())?,
             original,
@@ -88,4 +83,57 @@ pub fn mirrored(h: HalfedgeId, count: usize) -> HalfedgeId {
         face - faces
     };
     HalfedgeId::new(3 * other + 2 - k)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::ricci::shapes;
+
+    #[test]
+    fn a_double_is_closed_and_symmetric_and_keeps_ids() {
+        for shape in [shapes::sheet(6, false), shapes::sheet(9, true)] {
+            let surface = &shape.connectivity;
+            let double = Doubled::new(surface).unwrap();
+            let c = &double.connectivity;
+            c.validate().unwrap();
+            assert!(c.is_closed());
+            let (one, both) = (surface.topology(), c.topology());
+            assert_eq!(both.euler_characteristic, 2 * one.euler_characteristic);
+            assert_eq!(both.genus, one.boundary_loops as i64 - 1);
+            let count = surface.halfedge_count();
+            for h in c.halfedges() {
+                let image = mirrored(h, count);
+                assert_eq!(mirrored(image, count), h);
+                assert_eq!(double.original[c.tail(h)], double.original[c.head(image)]);
+                let twin = c.twin(h).unwrap();
+                assert!(c.twin(image) == Some(mirrored(twin, count)));
+                if h.index() < count {
+                    assert_eq!(c.tail(h), surface.tail(h));
+                    match surface.twin(h) {
+                        Some(t) => assert_eq!(t, twin),
+                        None => assert_eq!(image, twin),
+                    }
+                }
+            }
+            let length = double.on_both(surface, &shape.length);
+            for (e, &l) in length.enumerate() {
+                let h = c.edge_halfedge(e);
+                let own = if h.index() < count {
+                    h
+                } else {
+                    mirrored(h, count)
+                };
+                assert_eq!(l, shape.length[surface.edge(own)]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_closed_surface_stays() {
+        let shape = shapes::torus(5, 4);
+        let double = Doubled::new(&shape.connectivity).unwrap();
+        assert_eq!(double.connectivity, shape.connectivity);
+        assert!(double.original.enumerate().all(|(v, &o)| v == o));
+    }
 }

@@ -91,7 +91,15 @@ fn build_component(
     let central = Development::place(c, &cut, &layout, &unfolded);
     let charts = charts::chart(c, &cut, &central, &layout, &unfolded, &prescription)?;
     enter("patches")?;
-    let patches = patches::layout(&mesh, &metric.length, &cut, &central, &config.patches)?;
+    let under = Some((&layout, &unfolded));
+    let patches = patches::layout(
+        &mesh,
+        &metric.length,
+        &cut,
+        &central,
+        under,
+        &config.patches,
+    )?;
     enter("images")?;
     let image_origin = geometry_image::image_origin(&mesh);
     let images = geometry_image::sample(&mesh, &patches, &metric.log_scale, image_origin);

@@ -223,10 +223,10 @@ pub(super) fn bounds3<'a>(points: impl IntoIterator<Item = &'a Point3>) -> (Poin
 }
 
 /// Whether a face is counterclockwise, up to what double precision can tell of a sliver at coordinates as
-/// large as `reach`.
+/// large as `reach`. A face so small that its corners coincide there is not flipped.
 pub(super) fn is_positive(t: [Point2; 3], reach: f64) -> bool {
     let l = longest(lengths2(t));
-    doubled_area2(t) > -1e-14 * l * l - 1e-13 * reach * l
+    doubled_area2(t) >= -1e-14 * l * l - 1e-13 * reach * l
 }
 
 /// Whether a rotation lies in (−π, π].

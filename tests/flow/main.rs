@@ -3,6 +3,7 @@
 //! `AFFINE_ATLAS_CORPUS` names a folder of real models; without it, cases that need one are reported as ignored.
 //! `AFFINE_ATLAS_CHECKER` names an independent checker; `reference_u.npz` beside it holds the u of an independent prototype.
 
+mod checked;
 mod invariance;
 mod models;
 mod prescriptions;
@@ -47,6 +48,22 @@ fn main() {
         let file = corpus.as_ref().map(|c| c.join(name));
         trials.push(trial(format!("prescriptions/{name}"), file, |file| {
             prescriptions::converge(&file)
+        }));
+    }
+    for name in MODELS {
+        let file = corpus.as_ref().map(|c| c.join(name));
+        trials.push(trial(format!("checked/{name}"), file, |file| {
+            checked::first_prescription(&file)
+        }));
+    }
+    for (name, genus) in [
+        ("brezel.obj", 2),
+        ("three-holes.off", 3),
+        ("fertility.off", 4),
+    ] {
+        let file = corpus.as_ref().map(|c| c.join(name));
+        trials.push(trial(format!("single-cone/{name}"), file, move |file| {
+            checked::single_cone(&file, genus)
         }));
     }
     type Case = fn(&std::path::Path) -> Result<(), String>;

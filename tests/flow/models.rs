@@ -13,6 +13,8 @@ pub struct Model {
     pub connectivity: Connectivity,
     pub length: EdgeVec<f64>,
     pub positions: Vec<[f64; 3]>,
+    /// Vertices of the file.
+    pub source_vertex: Vec<u32>,
 }
 
 impl Model {
@@ -30,6 +32,7 @@ impl Model {
         };
         let length = connectivity.edges().map(length).collect();
         Self {
+            source_vertex: (0..positions.len() as u32).collect(),
             connectivity,
             length,
             positions,
@@ -44,7 +47,10 @@ impl Model {
         components.sort_by_key(|c| std::cmp::Reverse(c.faces));
         let mesh = components.swap_remove(0).mesh.unwrap();
         let positions = mesh.positions.as_slice().to_vec();
-        Self::with(mesh.connectivity, positions)
+        Self {
+            source_vertex: mesh.source_vertex.as_slice().to_vec(),
+            ..Self::with(mesh.connectivity, positions)
+        }
     }
 
     /// Flow with flips.

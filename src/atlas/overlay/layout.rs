@@ -60,6 +60,11 @@ impl Layout {
         }
     }
 
+    /// True where the overlay is finer than the layout.
+    pub fn is_refined(&self) -> bool {
+        self.refinement.is_some()
+    }
+
     /// Where the corner that an overlay halfedge leaves lies.
     #[inline]
     pub fn carrier(&self, corner: HalfedgeId) -> Carrier {

@@ -155,13 +155,13 @@ fn refine(
     }
     let ground = match front_faces == base.face_count() {
         true => Ground::Whole,
-        false => Ground::Half(Half::new(
+        false => Ground::Half(Box::new(Half::new(
             &x,
             &metric.length,
             front_faces,
             &vertex,
             vertices,
-        )?),
+        )?)),
     };
     let regions = Regions::new(&Inputs {
         x: &x,

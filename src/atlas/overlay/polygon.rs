@@ -16,10 +16,14 @@ pub(super) type Distances = [[f64; MOST]; MOST];
 /// All distances between `count` corners.
 pub(super) fn distances(count: usize, between: impl Fn(usize, usize) -> f64) -> Distances {
     let mut all = [[0.0; MOST]; MOST];
-    for i in 0..count {
-        for j in i + 1..count {
-            all[i][j] = between(i, j);
-            all[j][i] = all[i][j];
+    for (i, row) in all.iter_mut().enumerate().take(count) {
+        for (j, d) in row.iter_mut().enumerate().take(count) {
+            // The same value both ways.
+            *d = if i == j {
+                0.0
+            } else {
+                between(i.min(j), i.max(j))
+            };
         }
     }
     all

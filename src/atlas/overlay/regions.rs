@@ -29,7 +29,7 @@ pub(super) enum Ground {
     /// The whole final triangulation is the layout.
     Whole,
     /// The part of it on the surface's own side.
-    Half(Half),
+    Half(Box<Half>),
 }
 
 impl Ground {

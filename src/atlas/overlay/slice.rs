@@ -38,10 +38,10 @@ pub(super) fn slice<E>(
     let Some(cut_off) = cut_off(n) else {
         return Ok(false);
     };
-    for k in 0..3 {
+    for (k, &arcs) in cut_off.iter().enumerate() {
         let before = (k + 2) % 3;
         let ends = |j: usize| (point(k, j), point(before, n[before] + 1 - j));
-        for j in 1..=cut_off[k] {
+        for j in 1..=arcs {
             let (p, q) = ends(j);
             if j == 1 {
                 region(&[point(k, 0), p, q])?;

@@ -32,11 +32,14 @@ pub(crate) mod samples;
 mod tests;
 
 use crate::atlas::cut::CutGraph;
-use crate::atlas::develop::Development;
+use crate::atlas::develop::{Development, Unfolded};
+use crate::atlas::overlay::Layout;
 use crate::atlas::plane::Similarity;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, PatchId};
 use crate::geometry::mesh::Mesh;
 use slit::Slit;
+#[cfg(test)]
+pub(crate) use slit::own_development_error;
 
 /// Most texels on a side of an image.
 pub const MAX_SIDE: usize = 8192;
@@ -172,7 +175,8 @@ impl PatchParams {
 /// Divides the central chart into patches, gives each an image size and a place in the packed square, and
 /// finds the seams.
 ///
-/// `length` holds the flat length of every edge, `development` the central chart of the disk that `cut` makes.
+/// `length` holds the flat length of every edge, `development` the central chart of the disk that `cut` makes, `under`
+/// the layout that carries them, where there is one: own coordinates of patches are developed from there.
 ///
 /// # Errors
 /// A parameter out of range, or coordinates and lengths that are not finite.
@@ -181,6 +185,7 @@ pub fn layout(
     length: &EdgeVec<f64>,
     cut: &CutGraph,
     development: &Development,
+    under: Option<(&Layout, &Unfolded)>,
     params: &PatchParams,
 ) -> Result<PatchLayout, PatchError> {
     params.validate()?;
@@ -195,7 +200,7 @@ pub fn layout(
             });
         }
     }
-    let slit = Slit::new(mesh, length, cut, development);
+    let slit = Slit::new(mesh, length, cut, development, under);
     let sets = segment::segment(&slit, params.log_scale_range);
     let mut face_patch = FaceVec::filled(PatchId::new(0), c.face_count());
     let mut uv = FaceVec::filled([[0.0; 2]; 3], c.face_count());

@@ -7,13 +7,14 @@
 //! would be too coarse ([`Slit::is_deep`]).
 
 use crate::atlas::cut::CutGraph;
-use crate::atlas::develop::Development;
+use crate::atlas::develop::{Development, Unfolded};
+use crate::atlas::overlay::Layout;
 use crate::atlas::plane;
 use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, HalfedgeId, VertexVec};
+use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, HalfedgeId, HalfedgeVec, VertexVec};
 use crate::geometry::mesh::{Mesh, distance, triangle_area};
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BinaryHeap, HashMap, HashSet};
 
 /// A region whose expected extent is less than this part of the chart's diameter is placed in its own
 /// frame. Central coordinates are good to about 1e-13 of the diameter after the development, hence
@@ -30,6 +31,8 @@ pub(super) struct Slit<'a> {
     pub cut: &'a CutGraph,
     /// The central chart.
     pub development: &'a Development,
+    /// The layout under the surface and how it was slit, where the surface is finer.
+    pub under: Option<(&'a Layout, &'a Unfolded)>,
     /// Flat length of every edge.
     pub length: &'a EdgeVec<f64>,
     /// Central coordinates of every copy.
@@ -52,6 +55,7 @@ impl<'a> Slit<'a> {
         length: &'a EdgeVec<f64>,
         cut: &'a CutGraph,
         development: &'a Development,
+        under: Option<(&'a Layout, &'a Unfolded)>,
     ) -> Slit<'a> {
         let connectivity = &mesh.connectivity;
         let mut central = vec![[f64::NAN; 2]; development.copies];
@@ -83,6 +87,7 @@ impl<'a> Slit<'a> {
             mesh,
             cut,
             development,
+            under: under.filter(|(layout, _)| layout.is_refined()),
             length,
             central,
             source_area,
@@ -137,42 +142,155 @@ impl<'a> Slit<'a> {
     }
 
     /// Develops the faces that `member` accepts and that are connected to `root`, around the middle of
-    /// `root`'s first edge, and writes the coordinates of their copies. The longest edges are
-    /// crossed first: an edge carries its direction further with an error in proportion to 1 / length.
+    /// `root`'s first edge (or the one it lies on in the layout), and writes the coordinates of their copies.
+    ///
+    /// Where the surface is an overlay, what is developed are the layout's cells under these faces: an overlay has slivers.
     pub fn develop(
         &self,
         root: FaceId,
         member: impl Fn(FaceId) -> bool,
         positions: &mut [[f64; 2]],
     ) {
+        let disk = Disk {
+            connectivity: self.connectivity,
+            length: self.length,
+            cut: self.cut,
+            copy: &self.development.copy,
+        };
+        let Some((layout, unfolded)) = self.under else {
+            disk.develop(root, member, |copy, p| positions[copy as usize] = p);
+            return;
+        };
+        let mut faces = vec![root];
+        let mut listed = HashSet::from([root]);
+        let mut cells = HashSet::new();
+        let mut next = 0;
+        while let Some(&f) = faces.get(next) {
+            next += 1;
+            cells.insert(layout.cell_under(f));
+            let found = self
+                .neighbours(f)
+                .filter(|&g| member(g) && listed.insert(g));
+            faces.extend(found);
+        }
+        let under = Disk {
+            connectivity: &layout.connectivity,
+            length: &layout.length,
+            cut: &unfolded.cut,
+            copy: &unfolded.copy,
+        };
+        let root = layout.carrier(self.connectivity.corner_halfedge(root, 0));
+        let mut placed = HashMap::new();
+        under.develop(
+            layout.connectivity.face(root.halfedge),
+            |f| cells.contains(&layout.cell[f]),
+            |copy, p| {
+                placed.insert(copy, p);
+            },
+        );
+        // Neighbouring faces of one patch lie in the same cell or in neighbouring ones, so every corner has been reached.
+        let at = |g| placed.get(&unfolded.copy[g]).copied().unwrap_or([0.0; 2]);
+        for f in faces {
+            for h in self.connectivity.face_halfedges(f) {
+                positions[self.development.copy[h] as usize] = layout.place(h, at);
+            }
+        }
+    }
+
+    /// Largest difference between a face's sides in the plane and its flat lengths, relative to its
+    /// longest side.
+    pub fn length_error(&self, faces: &[FaceId], positions: &[[f64; 2]]) -> f64 {
         let c = self.connectivity;
-        let mut placed = std::collections::HashSet::new();
-        let mut visited = std::collections::HashSet::from([root]);
+        faces.iter().fold(0.0, |worst: f64, &f| {
+            let copies = self.copies(f);
+            let lengths = c.face_halfedges(f).map(|h| self.length[c.edge(h)]);
+            let longest = lengths.iter().fold(f64::MIN_POSITIVE, |m, &l| m.max(l));
+            (0..3).fold(worst, |worst, k| {
+                let d = plane::distance(positions[copies[k]], positions[copies[(k + 1) % 3]]);
+                worst.max((d - lengths[k]).abs() / longest)
+            })
+        })
+    }
+}
+
+/// Develops the whole disk from face 0 as a patch would be: the largest error of a side relative to the chart's diameter.
+#[cfg(test)]
+pub(crate) fn own_development_error(
+    mesh: &Mesh,
+    length: &EdgeVec<f64>,
+    cut: &CutGraph,
+    development: &Development,
+    under: Option<(&Layout, &Unfolded)>,
+) -> f64 {
+    let slit = Slit::new(mesh, length, cut, development, under);
+    let mut own = vec![[f64::NAN; 2]; development.copies];
+    slit.develop(FaceId::new(0), |_| true, &mut own);
+    let c = slit.connectivity;
+    c.halfedges().fold(0.0, |worst: f64, h| {
+        let [a, b] = [h, c.next(h)].map(|h| own[development.copy[h] as usize]);
+        let error = (plane::distance(a, b) - length[c.edge(h)]).abs();
+        assert!(error.is_finite());
+        worst.max(error / slit.diameter)
+    })
+}
+
+/// A triangulation slit along a cut, with its lengths.
+struct Disk<'a> {
+    connectivity: &'a Connectivity,
+    length: &'a EdgeVec<f64>,
+    cut: &'a CutGraph,
+    copy: &'a HalfedgeVec<u32>,
+}
+
+impl Disk<'_> {
+    /// Develops the faces that `member` accepts and that are connected to `root`; `put` is told every copy once. The longest
+    /// edges are crossed first: an edge carries its direction further with an error in proportion to 1 / length.
+    fn develop(
+        &self,
+        root: FaceId,
+        member: impl Fn(FaceId) -> bool,
+        mut put: impl FnMut(u32, [f64; 2]),
+    ) {
+        let c = self.connectivity;
+        let mut placed: HashMap<u32, [f64; 2]> = HashMap::new();
+        let mut visited = HashSet::from([root]);
         let mut queue: BinaryHeap<(u64, Reverse<HalfedgeId>)> = BinaryHeap::new();
         // Non-negative floats compare like their bits.
         let key = |h: HalfedgeId| (self.length[c.edge(h)].to_bits(), Reverse(h));
+        let mut place = |copy: u32, p: [f64; 2]| -> [f64; 2] {
+            *placed.entry(copy).or_insert_with(|| {
+                put(copy, p);
+                p
+            })
+        };
+        let copies = |f: FaceId| c.face_halfedges(f).map(|h| self.copy[h]);
         let first = c.corner_halfedge(root, 0);
-        let [a, b, apex] = self.copies(root);
+        let [a, b, apex] = copies(root);
         let half = 0.5 * self.length[c.edge(first)];
-        positions[a] = [-half, 0.0];
-        positions[b] = [half, 0.0];
-        positions[apex] = self.apex(first, positions[a], positions[b]);
-        placed.extend([a, b, apex]);
-        queue.extend(c.face_halfedges(root).map(key));
+        let (a, b) = (place(a, [-half, 0.0]), place(b, [half, 0.0]));
+        let apex = place(apex, self.apex(first, a, b));
+        let ends = [(a, b), (b, apex), (apex, a)];
+        let mut between = HashMap::new();
+        for (h, ends) in c.face_halfedges(root).into_iter().zip(ends) {
+            between.insert(h, ends);
+            queue.push(key(h));
+        }
         while let Some((_, Reverse(h))) = queue.pop() {
-            let Some(t) = self.across(h) else { continue };
+            let Some((b, a)) = between.remove(&h) else {
+                continue;
+            };
+            let Some(t) = c.twin(h).filter(|_| !self.cut.is_cut[c.edge(h)]) else {
+                continue;
+            };
             let f = c.face(t);
             if !member(f) || !visited.insert(f) {
                 continue;
             }
-            let k = c.corner(t);
-            let copies = self.copies(f);
-            let (a, b, apex) = (copies[k], copies[(k + 1) % 3], copies[(k + 2) % 3]);
-            if placed.insert(apex) {
-                positions[apex] = self.apex(t, positions[a], positions[b]);
+            let apex = place(self.copy[c.prev(t)], self.apex(t, a, b));
+            for (side, ends) in [(c.next(t), (b, apex)), (c.prev(t), (apex, a))] {
+                between.insert(side, ends);
+                queue.push(key(side));
             }
-            queue.push(key(c.next(t)));
-            queue.push(key(c.prev(t)));
         }
     }
 
@@ -193,21 +311,6 @@ impl<'a> Slit<'a> {
             a[0] + along * unit[0] - height * unit[1],
             a[1] + along * unit[1] + height * unit[0],
         ]
-    }
-
-    /// Largest difference between a face's sides in the plane and its flat lengths, relative to its
-    /// longest side.
-    pub fn length_error(&self, faces: &[FaceId], positions: &[[f64; 2]]) -> f64 {
-        let c = self.connectivity;
-        faces.iter().fold(0.0, |worst: f64, &f| {
-            let copies = self.copies(f);
-            let lengths = c.face_halfedges(f).map(|h| self.length[c.edge(h)]);
-            let longest = lengths.iter().fold(f64::MIN_POSITIVE, |m, &l| m.max(l));
-            (0..3).fold(worst, |worst, k| {
-                let d = plane::distance(positions[copies[k]], positions[copies[(k + 1) % 3]]);
-                worst.max((d - lengths[k]).abs() / longest)
-            })
-        })
     }
 }
 

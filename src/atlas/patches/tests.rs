@@ -42,7 +42,7 @@ struct Checked {
 
 /// Lays out and samples, and checks everything that holds for every input.
 fn check(s: &Sample, params: &PatchParams) -> Checked {
-    let layout = layout(&s.mesh, &s.length, &s.cut, &s.development, params).unwrap();
+    let layout = layout(&s.mesh, &s.length, &s.cut, &s.development, None, params).unwrap();
     let images = sample(&s.mesh, &layout, &s.log_scale, image_origin(&s.mesh));
     let mut faces = vec![Vec::new(); layout.patches.len()];
     for (f, p) in layout.face_patch.enumerate() {
@@ -119,7 +119,7 @@ fn check_plane(s: &Sample, l: &PatchLayout, p: usize, faces: &[FaceId], params: 
             assert!(common_area(a, b) < 1e-6 * smaller, "{f} and {g} overlap");
         }
     }
-    let slit = Slit::new(&s.mesh, &s.length, &s.cut, &s.development);
+    let slit = Slit::new(&s.mesh, &s.length, &s.cut, &s.development, None);
     let scales = faces.iter().map(|&f| slit.log_scale[f]);
     let (low, high) = scales.fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(x), b.max(x)));
     assert!(high - low <= params.log_scale_range);
@@ -513,8 +513,9 @@ fn units_and_last_digits_change_nothing() {
         || samples::square(9),
     ];
     for make in make {
-        let run =
-            |s: &Sample| layout(&s.mesh, &s.length, &s.cut, &s.development, &params()).unwrap();
+        let run = |s: &Sample| {
+            layout(&s.mesh, &s.length, &s.cut, &s.development, None, &params()).unwrap()
+        };
         let reference = run(&make());
         for scale in [1.0, 1e-3, 1e3, 1e6] {
             let other = run(&perturbed(make(), scale));
@@ -534,7 +535,8 @@ fn units_and_last_digits_change_nothing() {
 #[test]
 fn bad_parameters_and_numbers_are_refused() {
     let mut s = square(2);
-    let run = |s: &Sample, p: &PatchParams| layout(&s.mesh, &s.length, &s.cut, &s.development, p);
+    let run =
+        |s: &Sample, p: &PatchParams| layout(&s.mesh, &s.length, &s.cut, &s.development, None, p);
     for bad in [
         PatchParams {
             log_scale_range: f64::NAN,

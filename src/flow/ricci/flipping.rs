@@ -136,3 +136,154 @@ pub(super) fn flow(
 fn exponential(values: &EdgeVec<f64>) -> EdgeVec<f64> {
     values.iter().map(|l| l.exp()).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::shapes::{self, Shape};
+    use super::super::{Scheme, Solver, flow as run};
+    use super::*;
+    use crate::flow::cones::{BoundaryCondition, Prescription};
+    use crate::geometry::ids::VertexId;
+    use std::f64::consts::PI;
+
+    fn solve(shape: &Shape, prescription: &Prescription, solver: Solver) -> FlatMetric {
+        let params = FlowParams {
+            scheme: Scheme::VertexScaling,
+            solver,
+            ..FlowParams::default()
+        };
+        run(
+            &shape.connectivity,
+            &shape.length,
+            prescription,
+            &params,
+            &(),
+        )
+        .unwrap()
+    }
+
+    /// Curvature of the final triangulation from its lengths alone is the target, on both halves of a double.
+    fn assert_flat(shape: &Shape, prescription: &Prescription, flat: &FlatMetric) {
+        let x = flat.intrinsic.as_ref().unwrap();
+        let double = Doubled::new(&shape.connectivity).unwrap();
+        let measured = metric::curvature(&x.flat, &flat.length).unwrap();
+        let free = prescription.boundary == BoundaryCondition::Free;
+        for (v, &own) in double.original.enumerate() {
+            let boundary = shape.connectivity.is_boundary_vertex(own);
+            assert!((x.u[v] - flat.log_scale[own]).abs() < 1e-9);
+            let factor = if boundary { 2.0 } else { 1.0 };
+            assert!((measured[v] - factor * flat.curvature[own]).abs() < 1e-9);
+            if boundary && free {
+                assert_eq!(x.u[v], 0.0);
+            } else {
+                assert!((measured[v] - factor * prescription.target[own]).abs() < 1e-9);
+            }
+        }
+        let total: f64 = flat.curvature.iter().sum();
+        let required = 2.0 * PI * shape.connectivity.topology().euler_characteristic as f64;
+        assert!((total - required).abs() < 1e-9);
+    }
+
+    #[test]
+    fn small_surfaces_of_every_kind() {
+        for shape in shapes::small() {
+            let mut prescriptions = vec![shape.prescribe_default()];
+            if !shape.connectivity.is_closed() {
+                prescriptions.push(shape.prescribe_uniform_boundary());
+            }
+            for prescription in prescriptions {
+                let flat = solve(&shape, &prescription, Solver::Newton);
+                assert!(flat.max_curvature_error <= 1e-10);
+                assert_flat(&shape, &prescription, &flat);
+            }
+        }
+    }
+
+    #[test]
+    fn newton_and_the_flow_agree() {
+        let shapes = [
+            shapes::plate(0, 2),
+            shapes::torus(9, 7),
+            shapes::sheet(7, false),
+        ];
+        for shape in shapes {
+            let prescription = shape.prescribe_default();
+            let newton = solve(&shape, &prescription, Solver::Newton);
+            let gradient = solve(&shape, &prescription, Solver::Gradient);
+            assert_flat(&shape, &prescription, &gradient);
+            for (a, b) in newton.log_scale.iter().zip(gradient.log_scale.iter()) {
+                assert!((a - b).abs() < 1e-7, "{}: {a} against {b}", shape.name);
+            }
+        }
+    }
+
+    /// A closed tube of `rings` octagons.
+    fn tube(rings: usize) -> Shape {
+        let mut positions = vec![[0.0, 0.0, -1.0]];
+        for i in 0..rings {
+            for j in 0..8 {
+                let angle = (j as f64 + 0.5 * (i % 2) as f64) * PI / 4.0;
+                positions.push([1.3 * angle.cos(), 1.3 * angle.sin(), i as f64]);
+            }
+        }
+        let last = positions.len() as u32;
+        positions.push([0.0, 0.0, rings as f64]);
+        let at = |i: usize, j: usize| (1 + 8 * i + j % 8) as u32;
+        let mut faces = Vec::new();
+        for j in 0..8 {
+            faces.push([0, at(0, j + 1), at(0, j)]);
+            faces.push([last, at(rings - 1, j), at(rings - 1, j + 1)]);
+            for i in 0..rings - 1 {
+                let q = [at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)];
+                let odd = i % 2 == 1;
+                faces.extend(match odd {
+                    true => [[q[0], q[1], q[2]], [q[0], q[2], q[3]]],
+                    false => [[q[0], q[1], q[3]], [q[1], q[2], q[3]]],
+                });
+            }
+        }
+        Shape::new("tube", &faces, &positions)
+    }
+
+    /// Along a tube of length L and girth G whose end holds the curvature k, u changes by (2π − k) L / G.
+    #[test]
+    fn a_long_tube_scales_by_hundreds_of_orders() {
+        let shape = tube(240);
+        let last = shape.connectivity.vertex_count() - 1;
+        let mut cones = vec![(0, -4.0 * PI)];
+        cones.extend((0..5).map(|i| (last - 2 * i, 1.6 * PI)));
+        let prescription = shape.prescribe(&cones);
+        let flat = solve(&shape, &prescription, Solver::Newton);
+        assert!(flat.max_curvature_error <= 1e-10);
+        let range = flat.log_scale[VertexId::new(9)] - flat.log_scale[VertexId::new(last - 16)];
+        assert!(range.abs() > 300.0, "{range}");
+        assert_flat(&shape, &prescription, &flat);
+    }
+
+    #[test]
+    fn a_scale_range_beyond_float64_is_refused_with_the_reason() {
+        let shape = tube(500);
+        let last = shape.connectivity.vertex_count() - 1;
+        let mut cones = vec![(0, -4.0 * PI)];
+        cones.extend((0..5).map(|i| (last - 2 * i, 1.6 * PI)));
+        let params = FlowParams {
+            scheme: Scheme::VertexScaling,
+            ..FlowParams::default()
+        };
+        let (c, length) = (&shape.connectivity, &shape.length);
+        let error = run(c, length, &shape.prescribe(&cones), &params, &()).unwrap_err();
+        assert!(matches!(error, FlowError::ScaleRange { range, .. } if range > 600.0));
+    }
+
+    #[test]
+    fn all_curvature_at_one_vertex_without_repair() {
+        for (genus, level) in [(2, 2), (3, 2), (4, 1)] {
+            let shape = shapes::plate(genus, level);
+            let total = -4.0 * PI * (genus as f64 - 1.0);
+            let prescription = shape.prescribe(&[(5, total)]);
+            let flat = solve(&shape, &prescription, Solver::Newton);
+            assert!(flat.max_curvature_error <= 1e-10);
+            assert_flat(&shape, &prescription, &flat);
+        }
+    }
+}

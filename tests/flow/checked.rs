@@ -1,0 +1,88 @@
+//! What the flow found, as a whole atlas: the program builds it, its own `verify` and an independent checker look at it.
+
+use crate::models::Model;
+use crate::prescriptions;
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// The first of the random prescriptions of a model.
+pub fn first_prescription(file: &Path) -> Result<(), String> {
+    let model = Model::read(file);
+    let prescription = prescriptions::random(&model, 0, prescriptions::RANGE);
+    let cones: Vec<String> = prescription
+        .cones
+        .iter()
+        .map(|cone| {
+            let vertex = model.source_vertex[cone.vertex.index()];
+            let curvature = cone.curvature / std::f64::consts::PI;
+            format!("{{ vertex = {vertex}, curvature = {curvature:?} }}")
+        })
+        .collect();
+    let list = format!("cones.list=[{}]", cones.join(", "));
+    let strategy = match cones.is_empty() {
+        true => "cones.strategy=none",
+        false => "cones.strategy=listed",
+    };
+    build_and_check(file, &[&list, strategy], cones.len())
+}
+
+/// All curvature at one vertex, with the connectivity as it is.
+pub fn single_cone(file: &Path, genus: i64) -> Result<(), String> {
+    assert_eq!(Model::read(file).connectivity.topology().genus, genus);
+    let settings = ["cones.strategy=single", "connectivity.enabled=false"];
+    build_and_check(file, &settings, 1)
+}
+
+fn build_and_check(file: &Path, settings: &[&str], cones: usize) -> Result<(), String> {
+    let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
+    let mut command = program();
+    command
+        .arg("build")
+        .arg(file)
+        .arg("--out")
+        .arg(folder.path());
+    let fixed = ["flow.scheme=vertex-scaling", "pictures.enabled=false"];
+    for setting in fixed.iter().chain(settings) {
+        command.arg("--set").arg(setting);
+    }
+    succeed("build", &mut command)?;
+    let atlas = folder.path().join(file.file_stem().unwrap_or_default());
+    let text = std::fs::read(atlas.join("atlas.json")).map_err(|e| e.to_string())?;
+    let json: serde_json::Value = serde_json::from_slice(&text).map_err(|e| e.to_string())?;
+    let error = json["metric"]["max_curvature_error"].as_f64();
+    if error.is_none_or(|e| e > 1e-10) {
+        return Err(format!("curvature error {error:?}"));
+    }
+    succeed("verify", program().arg("verify").arg(&atlas))?;
+    let Some(checker) = std::env::var_os("AFFINE_ATLAS_CHECKER") else {
+        return Ok(());
+    };
+    let python = std::env::var_os("AFFINE_ATLAS_PYTHON").unwrap_or_else(|| "python3".into());
+    let mut command = Command::new(python);
+    command.arg(checker).arg(&atlas);
+    command.arg("--cones").arg(cones.to_string());
+    // The checker compares with the source of OBJ and OFF files only.
+    if file.extension().is_some_and(|e| e == "obj" || e == "off") {
+        command.arg("--source").arg(file);
+    }
+    succeed("checker", &mut command)
+}
+
+fn program() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_affine-atlas"))
+}
+
+fn succeed(who: &str, command: &mut Command) -> Result<(), String> {
+    let Output {
+        status,
+        stdout,
+        stderr,
+    } = command.output().map_err(|e| e.to_string())?;
+    if status.success() {
+        return Ok(());
+    }
+    let said = String::from_utf8_lossy(&stdout);
+    let failed: Vec<&str> = said.lines().filter(|l| l.starts_with("FAIL")).collect();
+    let stderr = String::from_utf8_lossy(&stderr);
+    Err(format!("{who}: {}\n{stderr}", failed.join("\n")))
+}
