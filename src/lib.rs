@@ -43,6 +43,8 @@
 //! | γ, Φ | `radius`, `phi` | radii and intersection angles of a circle packing |
 //! | l, l̄ | `length`, `source_length` | flat length and length in space |
 //! | θ | `angle` | corner angle, radians |
+//! | λ | `penner` | logarithm of a length at u = 0, under Ptolemy flips a Penner coordinate |
+//! | A, B, C | `base`, `delaunay`, `flat` | the mesh, its intrinsic Delaunay triangulation, the final one |
 //! | χ, g | `euler_characteristic`, `genus` | V − E + F and the number of handles |
 //! | φ | `transition`, `gluing` | rigid motions between charts and across the cut |
 //!
@@ -52,6 +54,10 @@
 //! * B. Chow, F. Luo. *Combinatorial Ricci flows on surfaces.* J. Differential Geom. 63, 2003.
 //! * X. D. Gu, F. Luo, J. Sun, T. Wu. *A discrete uniformization theorem for polyhedral surfaces.* J. Differential Geom. 109, 2018.
 //! * M. Gillespie, B. Springborn, K. Crane. *Discrete conformal equivalence of polyhedral surfaces.* ACM Trans. Graph. 40, 2021.
+//! * B. Springborn. *Ideal hyperbolic polyhedra and discrete uniformization.* Discrete Comput. Geom. 64, 2020.
+//! * M. Gillespie, B. Springborn, K. Crane. *Discrete conformal equivalence of polyhedral surfaces.* SIGGRAPH 2021.
+//! * M. Gillespie, N. Sharp, K. Crane. *Integer coordinates for intrinsic geometry processing.* SIGGRAPH Asia 2021.
+//! * M. Campen, R. Capouellez, H. Shen, L. Zhu, D. Panozzo, D. Zorin. *Efficient and robust discrete conformal equivalence with boundary.* SIGGRAPH Asia 2021.
 //! * D. Glickenstein. *Discrete conformal variations and scalar curvature on piecewise flat manifolds.* J. Differential Geom. 87, 2011.
 //! * J. Erickson, K. Whittlesey. *Greedy optimal homotopy and homology generators.* SODA 2005.
 //! * X. Gu, S. Gortler, H. Hoppe. *Geometry images.* SIGGRAPH 2002.
