@@ -64,6 +64,9 @@ pub struct Summary {
     pub cones: usize,
     /// max |K − K̄| over the prescribed vertices, radians.
     pub max_curvature_error: f64,
+    /// True where that is more than the bound that was asked for, because rounding stopped the flow.
+    #[serde(default)]
+    pub limited_by_float64: bool,
     /// (9), both areas normalised to 1.
     pub area_distortion: f64,
     /// Folder that was written.
@@ -81,6 +84,7 @@ impl Summary {
             boundary_loops: atlas.topology.boundary_loops,
             cones: atlas.prescription.cones.len(),
             max_curvature_error: atlas.metric.max_curvature_error,
+            limited_by_float64: atlas.limited_by_float64(),
             area_distortion: atlas.quality.area_distortion,
             folder,
         }

@@ -46,6 +46,14 @@ pub struct AffineAtlas {
     pub seamless: bool,
 }
 
+impl AffineAtlas {
+    /// True where rounding stopped the flow above the curvature tolerance; the achieved error is in `metric`.
+    #[must_use]
+    pub fn limited_by_float64(&self) -> bool {
+        self.metric.max_curvature_error > self.flow.curvature_tolerance
+    }
+}
+
 /// What connectivity repair changed (tutorial 5.3).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ConnectivityRepair {

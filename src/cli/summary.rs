@@ -181,7 +181,10 @@ fn row(
             figure(&|f| f.faces.to_string()),
             figure(&|f| f.genus.to_string()),
             figure(&|f| f.cones.to_string()),
-            figure(&|f| format!("{:.1e}", f.max_curvature_error)),
+            figure(&|f| match f.limited_by_float64 {
+                true => format!("{:.1e} (float64)", f.max_curvature_error),
+                false => format!("{:.1e}", f.max_curvature_error),
+            }),
             figure(&|f| format!("{:.4}", f.area_distortion)),
             seconds,
         ],
@@ -226,6 +229,7 @@ pub fn log(outcome: &AssetOutcome) {
                 boundary_loops = figures.boundary_loops,
                 cones = figures.cones,
                 max_curvature_error = figures.max_curvature_error,
+                limited_by_float64 = figures.limited_by_float64,
                 area_distortion = figures.area_distortion,
                 folder = %figures.folder.display(),
                 "component built"
@@ -267,6 +271,7 @@ mod tests {
             boundary_loops: 0,
             cones: 8,
             max_curvature_error: 3.14e-13,
+            limited_by_float64: false,
             area_distortion: 1.23456,
             folder: "out/spot".into(),
         };

@@ -80,8 +80,11 @@ fn build_component(
         metric,
         prescription,
         layout,
-        ..
+        unmatched,
     } = overlay::overlay(mesh, metric, prescription)?;
+    if unmatched > 0 {
+        tracing::warn!(unmatched, "crossings were placed between their neighbours");
+    }
     let c = &mesh.connectivity;
     enter("cut")?;
     let layout_cut = cut::cut(&layout.connectivity, &layout.cut_cost(&mesh), &prescription)?;

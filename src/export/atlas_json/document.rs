@@ -147,6 +147,8 @@ pub struct Metric {
     pub max_curvature_error: f64,
     /// Bound that was asked for, radians.
     pub curvature_tolerance: f64,
+    /// True where rounding stopped the flow above that bound.
+    pub limited_by_float64: bool,
     /// How well a circle packing keeps the lengths in space; absent for other schemes.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub fit: Option<PackingFit>,

@@ -122,6 +122,7 @@ fn metric(atlas: &AffineAtlas) -> Metric {
         flips: history.iter().map(|step| step.flips).sum(),
         max_curvature_error: atlas.metric.max_curvature_error,
         curvature_tolerance: atlas.flow.curvature_tolerance,
+        limited_by_float64: atlas.limited_by_float64(),
         fit: atlas.metric.fit,
         history: history.clone(),
     }
