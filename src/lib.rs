@@ -55,7 +55,6 @@
 //! * X. D. Gu, F. Luo, J. Sun, T. Wu. *A discrete uniformization theorem for polyhedral surfaces.* J. Differential Geom. 109, 2018.
 //! * M. Gillespie, B. Springborn, K. Crane. *Discrete conformal equivalence of polyhedral surfaces.* ACM Trans. Graph. 40, 2021.
 //! * B. Springborn. *Ideal hyperbolic polyhedra and discrete uniformization.* Discrete Comput. Geom. 64, 2020.
-//! * M. Gillespie, B. Springborn, K. Crane. *Discrete conformal equivalence of polyhedral surfaces.* SIGGRAPH 2021.
 //! * M. Gillespie, N. Sharp, K. Crane. *Integer coordinates for intrinsic geometry processing.* SIGGRAPH Asia 2021.
 //! * M. Campen, R. Capouellez, H. Shen, L. Zhu, D. Panozzo, D. Zorin. *Efficient and robust discrete conformal equivalence with boundary.* SIGGRAPH Asia 2021.
 //! * D. Glickenstein. *Discrete conformal variations and scalar curvature on piecewise flat manifolds.* J. Differential Geom. 87, 2011.
