@@ -117,6 +117,7 @@ pub(super) fn segment(slit: &Slit, range: f64) -> Vec<Vec<FaceId>> {
     let mut sets = Sets {
         slit,
         stamp: FaceVec::filled(0, slit.connectivity.face_count()),
+        copy_stamp: vec![0; slit.development.copies],
         last: 0,
     };
     let total: f64 = slit.source_area.iter().sum();
@@ -208,7 +209,8 @@ fn cover(
             // then it loses a face at least.
             let positions = placement.positions;
             let closer = Placement::new(slit, positions, disk.iter().copied());
-            if closer.is_injective(slit, &disk) {
+            // What was grown at this very extent has been found injective then.
+            if closer.extent == placement.extent || closer.is_injective(slit, &disk) {
                 disks.push(disk);
             } else {
                 stack.push(disk);
@@ -275,6 +277,7 @@ fn best_window(slit: &Slit, sorted: &[FaceId], range: f64) -> [f64; 2] {
 struct Sets<'a> {
     slit: &'a Slit<'a>,
     stamp: FaceVec<u32>,
+    copy_stamp: Vec<u32>,
     last: u32,
 }
 
@@ -286,6 +289,23 @@ impl Sets<'_> {
             self.stamp[f] = self.last;
         }
         self.last
+    }
+
+    /// Euler characteristic of a set of faces: 1 for a connected set that is a disk.
+    fn euler_characteristic(&mut self, faces: &[FaceId]) -> i64 {
+        let (slit, set) = (self.slit, self.mark(faces));
+        let (mut copies, mut inner) = (0, 0);
+        for &f in faces {
+            for copy in slit.copies(f) {
+                copies += i64::from(std::mem::replace(&mut self.copy_stamp[copy], set) != set);
+            }
+            inner += slit
+                .neighbours(f)
+                .filter(|&n| self.stamp[n] == set)
+                .count();
+        }
+        let edges = (3 * faces.len() - inner / 2) as i64;
+        copies - edges + faces.len() as i64
     }
 
     /// Connected components on the slit disk, each in the order given, by their first face.
@@ -350,9 +370,9 @@ pub(super) fn centroid(t: &Triangle) -> [f64; 2] {
     std::array::from_fn(|i| (t[0][i] + t[1][i] + t[2][i]) / 3.0)
 }
 
-/// Faces of a region (those with the stamp) that lie injectively in the plane, nearest to the seed first.
+/// Faces of a region (those with the stamp, which is taken from some) that lie injectively in the plane, nearest to the seed first.
 fn grow(
-    sets: &Sets,
+    sets: &mut Sets,
     region: &[FaceId],
     seed: FaceId,
     stamp: u32,
@@ -365,7 +385,9 @@ fn grow(
         let d = crate::atlas::plane::distance(centroid(t), start);
         (d / placement.extent * 1e7).round() as u64
     };
-    let mut seen = std::collections::HashSet::from([seed]);
+    sets.last += 1;
+    let seen = sets.last;
+    sets.stamp[seed] = seen;
     let mut queue = BinaryHeap::from([Reverse((0, seed))]);
     let mut grown = Vec::new();
     while let Some(Reverse((_, f))) = queue.pop() {
@@ -377,24 +399,13 @@ fn grow(
         index.insert(triangle);
         grown.push(f);
         for n in slit.neighbours(f) {
-            if sets.stamp[n] == stamp && seen.insert(n) {
+            if sets.stamp[n] == stamp {
+                sets.stamp[n] = seen;
                 queue.push(Reverse((key(&placement.triangle(slit, n)), n)));
             }
         }
     }
     grown
-}
-
-/// Euler characteristic of a set of faces: 1 for a connected set that is a disk.
-pub(super) fn euler_characteristic(slit: &Slit, faces: &[FaceId]) -> i64 {
-    let copies: BTreeSet<usize> = faces.iter().flat_map(|&f| slit.copies(f)).collect();
-    let set: BTreeSet<FaceId> = faces.iter().copied().collect();
-    let inner: usize = faces
-        .iter()
-        .map(|&f| slit.neighbours(f).filter(|n| set.contains(n)).count())
-        .sum();
-    let edges = 3 * faces.len() - inner / 2;
-    copies.len() as i64 - edges as i64 + faces.len() as i64
 }
 
 /// Cuts a connected injective set into disks along straight lines through its holes.
@@ -406,7 +417,7 @@ fn split_at_holes(
 ) {
     let mut stack = vec![faces];
     while let Some(faces) = stack.pop() {
-        if euler_characteristic(sets.slit, &faces) == 1 {
+        if sets.euler_characteristic(&faces) == 1 {
             disks.push(faces);
             continue;
         }
