@@ -11,8 +11,8 @@ use affine_atlas::flow::ricci::{self, FlatMetric, FlowParams, Scheme};
 use affine_atlas::flow::solve::SymmetricSolver;
 use affine_atlas::geometry::connectivity::Connectivity;
 use affine_atlas::geometry::ids::{EdgeId, EdgeVec, VertexId, VertexVec};
-use std::f64::consts::PI;
 use common::{Arguments, Triangles};
+use std::f64::consts::PI;
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -51,7 +51,10 @@ impl Level {
 
     fn peak(&self, name: &str) -> f64 {
         let of = |s: &&Stage| name.is_empty() || s.name == name;
-        self.stages.iter().filter(of).fold(0.0, |m, s| m.max(s.peak))
+        self.stages
+            .iter()
+            .filter(of)
+            .fold(0.0, |m, s| m.max(s.peak))
     }
 }
 
@@ -88,7 +91,10 @@ fn main() -> Result<(), Box<dyn Error>> {
                     vertices: triangles.positions.len(),
                     stages: measure(path)?,
                 };
-                if best.as_ref().is_none_or(|b| level.seconds(&[]) < b.seconds(&[])) {
+                if best
+                    .as_ref()
+                    .is_none_or(|b| level.seconds(&[]) < b.seconds(&[]))
+                {
                     best = Some(level);
                 }
             }
@@ -154,7 +160,10 @@ fn print_table(name: &str, levels: &[Level]) {
         ("whole job", &[]),
         ("flow", &["flow"]),
         ("overlay + cut + charts", &AFTER_FLOW),
-        ("patches to write", &["patches", "images", "report", "write"]),
+        (
+            "patches to write",
+            &["patches", "images", "report", "write"],
+        ),
     ];
     for (title, names) in growth {
         let mut cells = vec!["".to_owned()];

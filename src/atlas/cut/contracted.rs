@@ -179,10 +179,7 @@ impl<'a> Contracted<'a> {
             let mut at = f;
             // From the end of a twig to where it meets another one that is not stripped yet.
             while open(at, &gone) == 1 {
-                let side = c
-                    .face_halfedges(at)
-                    .into_iter()
-                    .find(|&h| !gone[c.edge(h)]);
+                let side = c.face_halfedges(at).into_iter().find(|&h| !gone[c.edge(h)]);
                 let Some(h) = side else { break };
                 gone[c.edge(h)] = true;
                 let Some(t) = c.twin(h) else { break };

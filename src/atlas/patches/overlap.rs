@@ -94,6 +94,11 @@ impl TriangleIndex {
 
     /// True where the triangle overlaps one that was added.
     pub fn overlaps(&self, t: &Triangle) -> bool {
+        self.overlaps_by(t, self.tolerance)
+    }
+
+    /// The same with a tolerance of its own.
+    pub fn overlaps_by(&self, t: &Triangle, tolerance: f64) -> bool {
         let own = self.level_of(t);
         let larger = |k: &i32| self.used[(k - self.levels[0]) as usize];
         let mut below: Vec<Cell> = Vec::new();
@@ -101,7 +106,7 @@ impl TriangleIndex {
             let Some(content) = self.cells.get(&(own, x, y)) else {
                 continue;
             };
-            if self.meets_list(t, content.own) {
+            if self.meets_list(t, content.own, tolerance) {
                 return true;
             }
             if content.is_parent {
@@ -111,7 +116,7 @@ impl TriangleIndex {
         if (own + 1..=self.levels[1]).filter(larger).any(|k| {
             cells(t, k).any(|(x, y)| {
                 let content = self.cells.get(&(k, x, y));
-                content.is_some_and(|content| self.meets_list(t, content.own))
+                content.is_some_and(|content| self.meets_list(t, content.own, tolerance))
             })
         }) {
             return true;
@@ -125,7 +130,7 @@ impl TriangleIndex {
                 let Some(content) = self.cells.get(&(k - 1, x, y)) else {
                     continue;
                 };
-                if self.meets_list(t, content.own) {
+                if self.meets_list(t, content.own, tolerance) {
                     return true;
                 }
                 if content.is_parent {
@@ -137,10 +142,10 @@ impl TriangleIndex {
     }
 
     /// True where the triangle overlaps one of a list.
-    fn meets_list(&self, t: &Triangle, mut node: u32) -> bool {
+    fn meets_list(&self, t: &Triangle, mut node: u32, tolerance: f64) -> bool {
         while node != END {
             let (id, next) = self.nodes[node as usize];
-            if overlap(t, &self.triangles[id as usize], self.tolerance) {
+            if overlap(t, &self.triangles[id as usize], tolerance) {
                 return true;
             }
             node = next;
@@ -205,9 +210,13 @@ fn separates(a: &Triangle, b: &Triangle, tolerance: f64) -> bool {
     (0..3).any(|k| {
         let (p, q) = (a[k], a[(k + 1) % 3]);
         let d = [q[0] - p[0], q[1] - p[1]];
-        let limit = tolerance * d[0].hypot(d[1]);
-        b.iter()
-            .all(|r| d[0] * (r[1] - p[1]) - d[1] * (r[0] - p[0]) <= limit)
+        let farthest = b.iter().fold(f64::NEG_INFINITY, |m, r| {
+            m.max(d[0] * (r[1] - p[1]) - d[1] * (r[0] - p[0]))
+        });
+        // The side's length is seldom needed, and its root costs more than the rest.
+        farthest <= 0.0
+            || farthest <= tolerance * 1.5 * (d[0].abs() + d[1].abs())
+                && farthest <= tolerance * d[0].hypot(d[1])
     })
 }
 

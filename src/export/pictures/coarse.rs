@@ -99,7 +99,10 @@ mod tests {
             assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
             counts.push(few.faces.len());
         }
-        assert!(counts[0] < 9000 && counts[1] < counts[0] * 5 / 4, "{counts:?}");
+        assert!(
+            counts[0] < 9000 && counts[1] < counts[0] * 5 / 4,
+            "{counts:?}"
+        );
     }
 
     #[test]

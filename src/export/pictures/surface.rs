@@ -216,8 +216,7 @@ impl<'a> Studio<'a> {
             if *place == NOTHING {
                 *place = self.normals.len() as u32;
                 let f = FaceId::new(object as usize);
-                self.normals
-                    .push(corner_normals(connectivity, &normals, f));
+                self.normals.push(corner_normals(connectivity, &normals, f));
             }
         }
     }
@@ -517,11 +516,7 @@ fn face_normals(connectivity: &Connectivity, positions: &[Vec3]) -> Vec<(Vec3, f
 }
 
 /// Unit normals of the corners of a face: the mean over the faces at the vertex that meet at a small angle.
-fn corner_normals(
-    connectivity: &Connectivity,
-    normals: &[(Vec3, f64)],
-    f: FaceId,
-) -> [Vec3; 3] {
+fn corner_normals(connectivity: &Connectivity, normals: &[(Vec3, f64)], f: FaceId) -> [Vec3; 3] {
     let own = normals[f.index()].0;
     [0, 1, 2].map(|k| {
         let v = connectivity.tail(connectivity.corner_halfedge(f, k));
