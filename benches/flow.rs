@@ -1,79 +1,42 @@
 //! The flow with flips against the machine itself: whole Newton solve in units of one ordering, factorisation and solve of
 //! its final matrix.
 //!
-//! `cargo bench --bench flow -- [--levels N] MESH…`: each mesh and its N midpoint subdivisions. One thread; each figure the least of three.
+//! `cargo bench --bench flow -- [--levels N] [--runs N] MESH…`: each mesh and its N midpoint subdivisions. One thread; each figure the
+//! least of three.
+
+mod common;
 
 use affine_atlas::flow::cones::{BoundaryCondition, Prescription};
 use affine_atlas::flow::ricci::{self, FlatMetric, FlowParams, Scheme};
 use affine_atlas::flow::solve::SymmetricSolver;
 use affine_atlas::geometry::connectivity::Connectivity;
 use affine_atlas::geometry::ids::{EdgeId, EdgeVec, VertexId, VertexVec};
-use affine_atlas::{read, repair};
+use common::{Arguments, Triangles};
 use std::f64::consts::PI;
-use std::path::PathBuf;
 use std::time::Instant;
-
-/// Runs of which the fastest counts.
-const RUNS: usize = 3;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build_global()?;
-    let mut levels = 0;
-    let mut meshes: Vec<PathBuf> = Vec::new();
-    let mut arguments = std::env::args().skip(1);
-    while let Some(argument) = arguments.next() {
-        match argument.as_str() {
-            "--levels" => levels = arguments.next().ok_or("--levels N")?.parse()?,
-            "--bench" => {}
-            _ => meshes.push(argument.into()),
-        }
-    }
-    for mesh in meshes {
-        let asset = read::read(&mesh, &Default::default())?;
-        let component = repair::repair(&asset.soup, &Default::default())?
-            .components
-            .swap_remove(0);
-        let component = component.mesh?;
-        let mut positions = component.positions.as_slice().to_vec();
-        let mut faces = component.connectivity.to_faces();
-        for level in 0..=levels {
+    let arguments = Arguments::parse()?;
+    for mesh in &arguments.meshes {
+        let mut triangles = Triangles::read(mesh)?;
+        for level in 0..=arguments.levels {
             if level > 0 {
-                (faces, positions) = subdivide(&faces, positions);
+                triangles.subdivide();
             }
-            measure(
-                &format!("{} level {level}", mesh.display()),
-                &faces,
-                &positions,
-            )?;
+            let name = format!("{} level {level}", mesh.display());
+            measure(&name, &triangles, arguments.runs)?;
         }
     }
     Ok(())
 }
 
-/// Every face into four, new vertices at the middle of its edges; the surface stays.
-fn subdivide(faces: &[[u32; 3]], mut positions: Vec<[f64; 3]>) -> (Vec<[u32; 3]>, Vec<[f64; 3]>) {
-    let mut middle = std::collections::HashMap::new();
-    let mut fine = Vec::with_capacity(4 * faces.len());
-    for &[a, b, c] in faces {
-        let mut between = |i: u32, j: u32| {
-            *middle.entry((i.min(j), i.max(j))).or_insert_with(|| {
-                let (p, q) = (positions[i as usize], positions[j as usize]);
-                positions.push(std::array::from_fn(|k| 0.5 * (p[k] + q[k])));
-                positions.len() as u32 - 1
-            })
-        };
-        let (ab, bc, ca) = (between(a, b), between(b, c), between(c, a));
-        fine.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
-    }
-    (fine, positions)
-}
-
 fn measure(
     name: &str,
-    faces: &[[u32; 3]],
-    positions: &[[f64; 3]],
+    Triangles { faces, positions }: &Triangles,
+    runs: usize,
 ) -> Result<(), Box<dyn std::error::Error>> {
     let connectivity = Connectivity::from_faces(faces, positions.len())?;
     let length: EdgeVec<f64> = connectivity
@@ -90,14 +53,14 @@ fn measure(
     };
     let mut best = f64::INFINITY;
     let mut last = None;
-    for _ in 0..RUNS {
+    for _ in 0..runs {
         let start = Instant::now();
         let flat = ricci::flow(&connectivity, &length, &prescription, &params, &())?;
         best = best.min(start.elapsed().as_secs_f64());
         last = Some(flat);
     }
     let Some(flat) = last else { return Ok(()) };
-    let solve = one_solve(&flat)?;
+    let solve = one_solve(&flat, runs)?;
     let steps = flat.history.last().map_or(0, |s| s.iteration);
     let flips: Vec<usize> = flat.history.iter().map(|s| s.flips).collect();
     println!(
@@ -121,7 +84,7 @@ fn eight_cones(connectivity: &Connectivity) -> Prescription {
 }
 
 /// Least seconds of ordering, factorising and solving once the Hessian at the end.
-fn one_solve(flat: &FlatMetric) -> Result<f64, Box<dyn std::error::Error>> {
+fn one_solve(flat: &FlatMetric, runs: usize) -> Result<f64, Box<dyn std::error::Error>> {
     let intrinsic = flat.intrinsic.as_ref().ok_or("no flips")?;
     let c = &intrinsic.flat;
     let n = c.vertex_count() - 1;
@@ -151,7 +114,7 @@ fn one_solve(flat: &FlatMetric) -> Result<f64, Box<dyn std::error::Error>> {
         }
     }
     let mut best = f64::INFINITY;
-    for _ in 0..RUNS {
+    for _ in 0..runs {
         let mut rhs = vec![1.0; n];
         let start = Instant::now();
         let mut solver = SymmetricSolver::new(n, &pairs)?;

@@ -1,80 +1,191 @@
-//! Seconds and share of every stage of the job on the fixtures, or on the meshes named as arguments.
+//! CPU seconds, share and peak memory of every stage of the job on the fixtures, or on the meshes named as arguments.
 //!
-//! `cargo bench --bench stages [-- MESH…]`. One thread, each mesh built three times, the fastest run shown.
+//! `cargo bench --bench stages -- [--levels N] [--runs N] [MESH…]`: each mesh and its N midpoint subdivisions with flips, one
+//! thread; the fastest run (of three) is shown. After each mesh: a table of its levels and how the time grows between them.
+
+mod common;
 
 use affine_atlas::config::Config;
+use affine_atlas::flow::ricci::Scheme;
 use affine_atlas::observe::Observer;
 use affine_atlas::{job, outcome::AssetState};
-use std::path::{Path, PathBuf};
+use common::{Arguments, Triangles, cpu_seconds, forget_peak, peak_mebibytes};
+use std::error::Error;
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
-use std::time::Instant;
 
-/// Notes when each stage begins.
+/// What a stage took.
+#[derive(Clone, Copy)]
+struct Stage {
+    name: &'static str,
+    seconds: f64,
+    /// MiB.
+    peak: f64,
+}
+
+/// Notes CPU seconds when each stage begins, and the peak of the one before.
 #[derive(Default)]
 struct Stopwatch {
-    begun: Mutex<Vec<(&'static str, Instant)>>,
+    begun: Mutex<Vec<(&'static str, f64, f64)>>,
 }
 
 impl Observer for Stopwatch {
     fn stage(&self, name: &'static str, _component: usize, _components: usize) {
         let mut begun = self.begun.lock().unwrap_or_else(PoisonError::into_inner);
-        begun.push((name, Instant::now()));
+        begun.push((name, cpu_seconds(), peak_mebibytes()));
+        forget_peak();
     }
 }
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// One mesh of a table.
+struct Level {
+    vertices: usize,
+    stages: Vec<Stage>,
+}
+
+impl Level {
+    fn seconds(&self, names: &[&str]) -> f64 {
+        let of = |s: &&Stage| names.is_empty() || names.contains(&s.name);
+        self.stages.iter().filter(of).map(|s| s.seconds).sum()
+    }
+
+    fn peak(&self, name: &str) -> f64 {
+        let of = |s: &&Stage| name.is_empty() || s.name == name;
+        self.stages
+            .iter()
+            .filter(of)
+            .fold(0.0, |m, s| m.max(s.peak))
+    }
+}
+
+/// What issue and documentation call overlay, cut and layout.
+const AFTER_FLOW: [&str; 3] = ["overlay", "cut", "charts"];
+
+fn main() -> Result<(), Box<dyn Error>> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build_global()?;
-    let named: Vec<PathBuf> = std::env::args()
-        .skip(1)
-        .filter(|a| !a.starts_with('-'))
-        .map(PathBuf::from)
-        .collect();
-    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/good");
-    let meshes = if named.is_empty() {
-        vec![
-            fixtures.join("disk-mask.obj"),
-            fixtures.join("genus-3-pretzel.obj"),
-        ]
-    } else {
-        named
-    };
-    for mesh in meshes {
-        let runs = (0..std::env::var("RUNS")
-            .ok()
-            .and_then(|r| r.parse().ok())
-            .unwrap_or(3))
-            .map(|_| measure(&mesh));
-        let runs = runs.collect::<Result<Vec<_>, _>>()?;
-        let total = |run: &Vec<(&str, f64)>| run.iter().map(|s| s.1).sum::<f64>();
-        let Some(best) = runs
-            .into_iter()
-            .min_by(|a, b| total(a).total_cmp(&total(b)))
-        else {
-            continue;
-        };
-        let sum = total(&best);
-        println!("{}: {sum:.3} s", mesh.display());
-        for (stage, seconds) in best {
-            println!(
-                "  {stage:<14}{seconds:8.3} s {:5.1} %",
-                100.0 * seconds / sum
-            );
+    let mut arguments = Arguments::parse()?;
+    if arguments.meshes.is_empty() {
+        let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/good");
+        arguments.meshes = ["disk-mask.obj", "genus-3-pretzel.obj"]
+            .map(|name| fixtures.join(name))
+            .into();
+    }
+    for mesh in &arguments.meshes {
+        let folder = tempfile::tempdir()?;
+        let mut triangles = Triangles::read(mesh)?;
+        let mut levels = Vec::new();
+        for number in 0..=arguments.levels {
+            let fine = folder.path().join("mesh.ply");
+            let path = if number == 0 {
+                mesh
+            } else {
+                triangles.subdivide();
+                triangles.write(&fine)?;
+                &fine
+            };
+            let mut best: Option<Level> = None;
+            for _ in 0..arguments.runs {
+                let level = Level {
+                    vertices: triangles.positions.len(),
+                    stages: measure(path)?,
+                };
+                if best
+                    .as_ref()
+                    .is_none_or(|b| level.seconds(&[]) < b.seconds(&[]))
+                {
+                    best = Some(level);
+                }
+            }
+            let Some(best) = best else { continue };
+            print_stages(&format!("{} level {number}", mesh.display()), &best);
+            levels.push(best);
+        }
+        if levels.len() > 1 {
+            print_table(&mesh.display().to_string(), &levels);
         }
     }
     Ok(())
 }
 
-/// Builds once into a temporary folder; stages in order with their seconds.
-fn measure(mesh: &Path) -> Result<Vec<(&'static str, f64)>, Box<dyn std::error::Error>> {
+fn print_stages(name: &str, level: &Level) {
+    let whole = level.seconds(&[]);
+    println!(
+        "{name}: {} vertices, {whole:.3} CPU s, peak {:.0} MiB, overlay + cut + charts {:.2} × flow",
+        level.vertices,
+        level.peak(""),
+        level.seconds(&AFTER_FLOW) / level.seconds(&["flow"])
+    );
+    for stage in &level.stages {
+        println!(
+            "  {:<14}{:9.3} s {:5.1} % {:7.0} MiB",
+            stage.name,
+            stage.seconds,
+            100.0 * stage.seconds / whole,
+            stage.peak
+        );
+    }
+}
+
+/// A column a level, and below how each row grows: the exponent of the vertex count from the level before.
+fn print_table(name: &str, levels: &[Level]) {
+    let row = |title: &str, cells: Vec<String>| println!("| {title} | {} |", cells.join(" | "));
+    let each = |f: &dyn Fn(&Level) -> String| levels.iter().map(f).collect::<Vec<_>>();
+    println!();
+    row(name, each(&|l| format!("{} vertices", l.vertices)));
+    row("---", each(&|_| "---".into()));
+    for stage in &levels[0].stages {
+        row(
+            stage.name,
+            each(&|l| {
+                let seconds = l.seconds(&[stage.name]);
+                format!("{seconds:.2} s, {:.0} %", 100.0 * seconds / l.seconds(&[]))
+            }),
+        );
+    }
+    row("whole job", each(&|l| format!("{:.2} s", l.seconds(&[]))));
+    for (title, stage) in [("flow", "flow"), ("overlay", "overlay"), ("whole job", "")] {
+        row(
+            &format!("peak of {title}"),
+            each(&|l| format!("{:.0} MiB", l.peak(stage))),
+        );
+    }
+    let ratio = |l: &Level| l.seconds(&AFTER_FLOW) / l.seconds(&["flow"]);
+    row(
+        "(overlay + cut + charts) / flow",
+        each(&|l| format!("{:.2}", ratio(l))),
+    );
+    let growth: [(&str, &[&str]); 4] = [
+        ("whole job", &[]),
+        ("flow", &["flow"]),
+        ("overlay + cut + charts", &AFTER_FLOW),
+        (
+            "patches to write",
+            &["patches", "images", "report", "write"],
+        ),
+    ];
+    for (title, names) in growth {
+        let mut cells = vec!["".to_owned()];
+        cells.extend(levels.windows(2).map(|pair| {
+            let times = pair[1].seconds(names) / pair[0].seconds(names);
+            let sizes = pair[1].vertices as f64 / pair[0].vertices as f64;
+            format!("{:.2}", times.ln() / sizes.ln())
+        }));
+        row(&format!("growth exponent of {title}"), cells);
+    }
+    println!();
+}
+
+/// Builds once into a temporary folder; stages in order, those that come again added up.
+fn measure(mesh: &Path) -> Result<Vec<Stage>, Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     let mut config = Config::default();
-    config.flow.scheme = affine_atlas::flow::ricci::Scheme::VertexScaling;
+    config.flow.scheme = Scheme::VertexScaling;
     let watch = Stopwatch::default();
     let given = mesh.to_string_lossy();
     let outcome = job::run(mesh, &given, folder.path(), "mesh", &config, &watch);
-    let end = Instant::now();
+    watch.stage("end", 0, 1);
     if let AssetState::Failed(failure) = outcome.state {
         return Err(failure.message.into());
     }
@@ -82,10 +193,20 @@ fn measure(mesh: &Path) -> Result<Vec<(&'static str, f64)>, Box<dyn std::error::
         .begun
         .into_inner()
         .unwrap_or_else(PoisonError::into_inner);
-    let ends = begun.iter().skip(1).map(|b| b.1).chain([end]);
-    Ok(begun
-        .iter()
-        .zip(ends)
-        .map(|(&(stage, start), end)| (stage, (end - start).as_secs_f64()))
-        .collect())
+    let mut stages: Vec<Stage> = Vec::new();
+    for pair in begun.windows(2) {
+        let [(name, start, _), (_, end, peak)] = [pair[0], pair[1]];
+        match stages.iter_mut().find(|s| s.name == name) {
+            Some(stage) => {
+                stage.seconds += end - start;
+                stage.peak = stage.peak.max(peak);
+            }
+            None => stages.push(Stage {
+                name,
+                seconds: end - start,
+                peak,
+            }),
+        }
+    }
+    Ok(stages)
 }

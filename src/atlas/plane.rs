@@ -55,8 +55,13 @@ impl Similarity {
 
 /// Rotates about the origin, counterclockwise.
 pub fn rotate(p: [f64; 2], angle: f64) -> [f64; 2] {
+    rotation(angle)(p)
+}
+
+/// The rotation about the origin by an angle, for many points.
+pub fn rotation(angle: f64) -> impl Fn([f64; 2]) -> [f64; 2] {
     let (s, c) = angle.sin_cos();
-    [c * p[0] - s * p[1], s * p[0] + c * p[1]]
+    move |p| [c * p[0] - s * p[1], s * p[0] + c * p[1]]
 }
 
 /// The same angle in (−π, π].

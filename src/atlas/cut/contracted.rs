@@ -1,29 +1,27 @@
 //! Shortest paths, homotopy basis and connections on the surface with every boundary loop contracted to a point.
 
+use super::paths::{Search, Ways};
 use crate::flow::cones::Prescription;
 use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{EdgeId, EdgeVec, HalfedgeId, NONE, VertexId, VertexVec};
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, NONE, VertexId, VertexVec};
 
-/// Roots that are tried for the homotopy basis of a surface with handles.
-const ROOTS: usize = 8;
+/// Most roots that are tried for the homotopy basis of a surface with handles …
+const MOST_ROOTS: usize = 8;
+/// … and least, where every one of them takes long.
+const LEAST_ROOTS: usize = 3;
+/// Vertices that the searches from all roots may visit together.
+const VISITS: usize = 200_000;
 
 /// The surface with every boundary loop taken as one point.
 pub(super) struct Contracted<'a> {
     connectivity: &'a Connectivity,
     length: &'a EdgeVec<f64>,
+    ways: Ways,
     loops: Vec<Vec<VertexId>>,
     /// Number of the boundary loop of a vertex, `NONE` inside.
     loop_of: VertexVec<u32>,
     is_cone: VertexVec<bool>,
     cones: Vec<VertexId>,
-}
-
-/// Distances and the halfedge by which each vertex was reached (pointing at it).
-struct Reach {
-    distance: VertexVec<f64>,
-    by: VertexVec<Option<HalfedgeId>>,
 }
 
 impl<'a> Contracted<'a> {
@@ -53,6 +51,7 @@ impl<'a> Contracted<'a> {
         Self {
             connectivity,
             length,
+            ways: Ways::new(connectivity, length),
             loops,
             loop_of,
             is_cone,
@@ -60,109 +59,70 @@ impl<'a> Contracted<'a> {
         }
     }
 
-    /// Both directions of every edge at `v` that may be cut, as halfedges towards the neighbour.
-    fn steps(&self, v: VertexId) -> impl Iterator<Item = (EdgeId, VertexId)> + '_ {
-        let c = self.connectivity;
-        // Boundary edges are never cut; every interior edge at `v` has an outgoing halfedge.
-        c.outgoing(v)
-            .filter(move |&h| c.twin(h).is_some())
-            .map(move |h| (c.edge(h), c.head(h)))
-    }
-
-    /// Shortest paths from `sources`; stops at the first vertex that `is_goal` accepts and returns it.
-    /// A boundary loop is entered as a whole, at no cost, unless it is left out by `enter_loops`.
-    fn shortest_paths(
-        &self,
-        sources: &[VertexId],
-        enter_loops: bool,
-        mut is_goal: impl FnMut(VertexId) -> bool,
-    ) -> (Reach, Option<VertexId>) {
-        let c = self.connectivity;
-        let mut reach = Reach {
-            distance: VertexVec::filled(f64::INFINITY, c.vertex_count()),
-            by: VertexVec::filled(None, c.vertex_count()),
-        };
-        // Non-negative floats order as their bits do; equal distances go by vertex.
-        let mut queue = BinaryHeap::new();
-        for &v in sources {
-            reach.distance[v] = 0.0;
-            queue.push(Reverse((0u64, v)));
-        }
-        while let Some(Reverse((bits, v))) = queue.pop() {
-            let d = f64::from_bits(bits);
-            if d > reach.distance[v] {
-                continue;
-            }
-            if is_goal(v) {
-                return (reach, Some(v));
-            }
-            if enter_loops && self.loop_of[v] != NONE {
+    /// Goes on with a search until all is reached. A boundary loop is entered as a whole, at no cost.
+    fn run(&self, search: &mut Search) {
+        while let Some(v) = search.settle() {
+            if self.loop_of[v] != NONE {
+                let d = search.distance(v);
                 for &w in &self.loops[self.loop_of[v] as usize] {
-                    if d < reach.distance[w] {
-                        reach.distance[w] = d;
-                        reach.by[w] = None;
-                        queue.push(Reverse((bits, w)));
-                    }
-                }
-            }
-            for h in c.outgoing(v).filter(|&h| c.twin(h).is_some()) {
-                let w = c.head(h);
-                let candidate = d + self.length[c.edge(h)];
-                if candidate < reach.distance[w] {
-                    reach.distance[w] = candidate;
-                    reach.by[w] = Some(h);
-                    queue.push(Reverse((candidate.to_bits(), w)));
+                    search.enter(w, d);
                 }
             }
         }
-        if enter_loops {
-            self.keep_one_entry(&mut reach);
-        }
-        (reach, None)
     }
 
-    /// Two vertices of a loop can be reached at exactly the same distance; as the loop is one point,
-    /// a tree may enter it once only.
-    fn keep_one_entry(&self, reach: &mut Reach) {
+    /// The tree of shortest paths from a root.
+    fn tree(&self, root: VertexId) -> Search<'_> {
+        let mut search = self.ways.search();
+        search.enter(root, 0.0);
+        self.run(&mut search);
+        // Two vertices of a loop can be reached at exactly the same distance; as the loop is one point,
+        // a tree may enter it once only.
         for vertices in &self.loops {
-            let entries = vertices.iter().copied().filter(|&v| reach.by[v].is_some());
-            let entries: Vec<VertexId> = entries.collect();
-            for &v in entries.iter().skip(1) {
-                reach.by[v] = None;
-            }
+            let entries = vertices.iter().filter(|&&v| search.by(v).is_some());
+            let late: Vec<VertexId> = entries.skip(1).copied().collect();
+            late.into_iter().for_each(|v| search.forget_way(v));
         }
+        search
     }
 
     /// Where a homotopy basis may start: the cones (a cone must be on the cut anyway), or vertices spread over the surface.
     pub(super) fn roots(&self) -> Vec<VertexId> {
-        let mut roots: Vec<VertexId> = self.cones.iter().copied().take(ROOTS).collect();
-        if roots.is_empty() {
-            roots.extend(self.loops.iter().take(ROOTS).map(|l| l[0]));
-        }
         // With one forced point the tutorial's basis goes through it; with none every place is as good.
         let wanted = match self.cones.len() + self.loops.len() {
             1 => 1,
-            _ => ROOTS,
+            _ => (VISITS / self.connectivity.vertex_count().max(1)).clamp(LEAST_ROOTS, MOST_ROOTS),
         };
+        let mut roots: Vec<VertexId> = self.cones.iter().copied().take(wanted).collect();
         if roots.is_empty() {
-            roots.push(self.farthest(&[VertexId::new(0)]));
+            roots.extend(self.loops.iter().take(wanted).map(|l| l[0]));
         }
+        if roots.is_empty() {
+            let mut search = self.ways.search();
+            search.enter(VertexId::new(0), 0.0);
+            roots.push(self.farthest(&mut search));
+        }
+        let mut search = self.ways.search();
+        roots.iter().for_each(|&v| search.enter(v, 0.0));
         while roots.len() < wanted {
-            let next = self.farthest(&roots);
-            if roots.contains(&next) {
+            let next = self.farthest(&mut search);
+            if search.distance(next) == 0.0 {
                 break;
             }
+            search.enter(next, 0.0);
             roots.push(next);
         }
         roots
     }
 
-    fn farthest(&self, from: &[VertexId]) -> VertexId {
-        let (reach, _) = self.shortest_paths(from, true, |_| false);
-        let mut best = (from[0], -1.0);
-        for (v, &d) in reach.distance.enumerate() {
-            if d > best.1 {
-                best = (v, d);
+    /// The vertex farthest from a search's sources of those it reaches, the first of equals.
+    fn farthest(&self, search: &mut Search) -> VertexId {
+        self.run(search);
+        let mut best = (VertexId::new(0), -1.0);
+        for v in self.connectivity.vertices() {
+            let distance = search.distance(v);
+            if distance > best.1 && distance.is_finite() {
+                best = (v, distance);
             }
         }
         best.0
@@ -171,18 +131,14 @@ impl<'a> Contracted<'a> {
     /// 2g loops from the root whose complement is one disk (with holes where boundary loops are).
     pub(super) fn homotopy_basis(&self, root: VertexId) -> EdgeVec<bool> {
         let c = self.connectivity;
-        let (reach, _) = self.shortest_paths(&[root], true, |_| false);
-        let mut in_tree = EdgeVec::filled(false, c.edge_count());
-        for h in reach.by.iter().flatten() {
-            in_tree[c.edge(*h)] = true;
-        }
+        let reach = self.tree(root);
         // Cotree: the longest closing loops go into the dual tree, so the shortest ones remain.
-        let mut duals: Vec<(f64, EdgeId)> = c
-            .edges()
-            .filter(|&e| !in_tree[e] && !c.is_boundary_edge(e))
+        let mut duals: Vec<(f64, EdgeId)> = self
+            .core(&reach)
+            .into_iter()
             .map(|e| {
-                let [a, b] = c.edge_vertices(e);
-                (reach.distance[a] + reach.distance[b] + self.length[e], e)
+                let [a, b] = c.edge_vertices(e).map(|v| reach.distance(v));
+                (a + b + self.length[e], e)
             })
             .collect();
         duals.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
@@ -190,7 +146,7 @@ impl<'a> Contracted<'a> {
         let mut is_cut = EdgeVec::filled(false, c.edge_count());
         for (_, e) in duals {
             let h = c.edge_halfedge(e);
-            let t = c.twin(h).expect("boundary edges were left out");
+            let Some(t) = c.twin(h) else { continue };
             if joined.join(c.face(h).index(), c.face(t).index()) {
                 continue;
             }
@@ -202,12 +158,43 @@ impl<'a> Contracted<'a> {
         is_cut
     }
 
+    /// The edges outside a tree of paths that lie on a closed walk across such edges, ascending.
+    ///
+    /// Any spanning tree of the dual graph holds all the others, whatever they weigh: they hang like the twigs of a tree
+    /// and are stripped from their ends. What is left is a few curves on the surface, so little remains to be sorted.
+    fn core(&self, reach: &Search) -> Vec<EdgeId> {
+        let c = self.connectivity;
+        // Edges that are not crossed: of the tree, of the boundary, and those stripped.
+        let mut gone: EdgeVec<bool> = c.edges().map(|e| c.is_boundary_edge(e)).collect();
+        for h in c.vertices().filter_map(|v| reach.by(v)) {
+            gone[c.edge(h)] = true;
+        }
+        let open = |f: FaceId, gone: &EdgeVec<bool>| {
+            c.face_halfedges(f)
+                .into_iter()
+                .filter(|&h| !gone[c.edge(h)])
+                .count()
+        };
+        for f in c.faces() {
+            let mut at = f;
+            // From the end of a twig to where it meets another one that is not stripped yet.
+            while open(at, &gone) == 1 {
+                let side = c.face_halfedges(at).into_iter().find(|&h| !gone[c.edge(h)]);
+                let Some(h) = side else { break };
+                gone[c.edge(h)] = true;
+                let Some(t) = c.twin(h) else { break };
+                at = c.face(t);
+            }
+        }
+        c.edges().filter(|&e| !gone[e]).collect()
+    }
+
     /// Marks the path by which `v` was reached; inside a contracted loop it moves at no cost.
-    fn mark_path(&self, reach: &Reach, v: VertexId, is_cut: &mut EdgeVec<bool>) {
+    fn mark_path(&self, reach: &Search, v: VertexId, is_cut: &mut EdgeVec<bool>) {
         let c = self.connectivity;
         let mut at = v;
         loop {
-            match reach.by[at] {
+            match reach.by(at) {
                 Some(h) => {
                     if std::mem::replace(&mut is_cut[c.edge(h)], true) {
                         break;
@@ -218,7 +205,7 @@ impl<'a> Contracted<'a> {
                     // The root, or a loop vertex reached through another one of its loop.
                     let entered = (self.loop_of[at] != NONE)
                         .then(|| &self.loops[self.loop_of[at] as usize])
-                        .and_then(|l| l.iter().copied().find(|&w| reach.by[w].is_some()));
+                        .and_then(|l| l.iter().copied().find(|&w| reach.by(w).is_some()));
                     match entered {
                         Some(w) => at = w,
                         None => break,
@@ -233,11 +220,9 @@ impl<'a> Contracted<'a> {
     pub(super) fn join_terminals(&self, is_cut: &mut EdgeVec<bool>, root: Option<VertexId>) {
         let c = self.connectivity;
         let mut attached = VertexVec::filled(false, c.vertex_count());
-        let mut sources = Vec::new();
-        let mut attach = |v: VertexId, sources: &mut Vec<VertexId>| -> bool {
-            if attached[v] {
-                return false;
-            }
+        // The search goes on from what it knows when the graph has grown: each path found is one of new sources.
+        let mut search = self.ways.search();
+        let attach = |v: VertexId, attached: &mut VertexVec<bool>, search: &mut Search| {
             let whole_loop = self.loop_of[v] != NONE;
             let group: &[VertexId] = if whole_loop {
                 &self.loops[self.loop_of[v] as usize]
@@ -245,41 +230,40 @@ impl<'a> Contracted<'a> {
                 std::slice::from_ref(&v)
             };
             for &w in group {
-                attached[w] = true;
-                sources.push(w);
+                if !std::mem::replace(&mut attached[w], true) {
+                    search.enter(w, 0.0);
+                }
             }
-            true
         };
+        let mut is_empty = true;
         for e in c.edges().filter(|&e| is_cut[e]) {
+            is_empty = false;
             for v in c.edge_vertices(e) {
-                attach(v, &mut sources);
+                attach(v, &mut attached, &mut search);
             }
         }
-        let terminals: Vec<VertexId> = self
-            .cones
-            .iter()
-            .copied()
-            .chain(self.loops.iter().map(|l| l[0]))
-            .collect();
-        if sources.is_empty() {
-            match root.or(terminals.first().copied()) {
-                Some(v) => attach(v, &mut sources),
+        if is_empty {
+            let first = self.cones.first().copied();
+            let first = first.or(self.loops.first().map(|l| l[0]));
+            match root.or(first) {
+                Some(v) => attach(v, &mut attached, &mut search),
                 None => return,
             };
         }
-        let is_terminal = |v: VertexId| self.is_cone[v] || self.loop_of[v] != NONE;
-        loop {
-            let mut is_source = VertexVec::filled(false, c.vertex_count());
-            sources.iter().for_each(|&v| is_source[v] = true);
-            let (reach, found) =
-                self.shortest_paths(&sources, false, |v| is_terminal(v) && !is_source[v]);
-            let Some(end) = found else { break };
-            attach(end, &mut sources);
-            let mut at = end;
-            while let Some(h) = reach.by[at] {
+        while let Some(end) = search.settle() {
+            if attached[end] || !(self.is_cone[end] || self.loop_of[end] != NONE) {
+                continue;
+            }
+            let mut way = search.by(end);
+            attach(end, &mut attached, &mut search);
+            while let Some(h) = way {
                 is_cut[c.edge(h)] = true;
-                at = c.tail(h);
-                attach(at, &mut sources);
+                let tail = c.tail(h);
+                if attached[tail] {
+                    break;
+                }
+                way = search.by(tail);
+                attach(tail, &mut attached, &mut search);
             }
         }
     }
@@ -299,9 +283,10 @@ impl<'a> Contracted<'a> {
             if !dangles(v, valence[v]) {
                 continue;
             }
-            let Some((e, w)) = self.steps(v).find(|&(e, _)| is_cut[e]) else {
+            let Some(h) = c.outgoing(v).find(|&h| is_cut[c.edge(h)]) else {
                 continue;
             };
+            let (e, w) = (c.edge(h), c.head(h));
             is_cut[e] = false;
             valence[v] -= 1;
             valence[w] -= 1;

@@ -12,6 +12,7 @@
 //! and chains that end at no cone are pruned. The basis depends on the root, so several are tried.
 
 mod contracted;
+mod paths;
 
 use crate::flow::cones::Prescription;
 use crate::geometry::connectivity::Connectivity;

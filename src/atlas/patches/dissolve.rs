@@ -6,13 +6,14 @@
 //!
 //! Every single step keeps all patches disks, injective and inside the range of log scale.
 
+use super::hashing::Set;
 use super::merge::around;
 use super::overlap::overlap;
 use super::segment::{Placement, TOUCHING, borders, centroid, place};
 use super::slit::Slit;
 use crate::atlas::plane;
 use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId};
-use std::collections::{BTreeSet, HashSet};
+use std::collections::BTreeSet;
 
 /// Patches of more faces are not divided: their neighbours would become ragged.
 const DIVIDED: usize = 600;
@@ -152,7 +153,7 @@ fn divide(parts: &mut Parts, small: u32, own: &mut [[f64; 2]]) {
     let mut faces = parts.faces[small as usize].clone();
     faces.sort();
     // Faces that each neighbour has room for in the plane.
-    let free: Vec<(u32, HashSet<FaceId>)> = parts
+    let free: Vec<(u32, Set<FaceId>)> = parts
         .neighbours(small)
         .into_iter()
         .map(|other| (other, room(parts, &faces, small, other, own)))
@@ -208,11 +209,11 @@ fn room(
     small: u32,
     other: u32,
     own: &mut [[f64; 2]],
-) -> HashSet<FaceId> {
+) -> Set<FaceId> {
     let slit = parts.slit;
     let theirs = &parts.faces[other as usize];
     let Some(&root) = theirs.first() else {
-        return HashSet::new();
+        return Set::default();
     };
     let highest = parts.log_scale[other as usize][1].max(parts.log_scale[small as usize][1]);
     let member = |f| [small, other].contains(&parts.label[f]);

@@ -1,11 +1,12 @@
 //! Neighbouring patches joined while their union is still a disk, injective, and within the range of
 //! log scale. Smallest first, so that crumbs disappear into what surrounds them.
 
+use super::hashing::Set;
 use super::segment::{borders, place, rounded_ln};
 use super::slit::Slit;
 use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId};
 use std::cmp::Reverse;
-use std::collections::{BTreeSet, HashSet};
+use std::collections::BTreeSet;
 
 struct Part {
     faces: Vec<FaceId>,
@@ -44,7 +45,7 @@ pub(super) fn merge(
         .collect();
     let unit: f64 = parts.iter().map(|p| p.area).sum();
     // Pairs that overlap, until one of them changes.
-    let mut overlapping: HashSet<(u32, u32)> = HashSet::new();
+    let mut overlapping: Set<(u32, u32)> = Set::default();
     for _ in 0..ROUNDS {
         let mut queue: BTreeSet<(i64, u32)> = (0..parts.len() as u32)
             .filter(|&i| !parts[i as usize].faces.is_empty())
@@ -117,7 +118,7 @@ fn within(a: &Part, b: &Part, range: f64) -> bool {
 /// Both are pieces of one disk, so what they share is a forest, and vertices − edges counts its trees.
 fn joins_to_a_disk(slit: &Slit, part: &Part, label: &FaceVec<u32>, other: u32) -> bool {
     let c = slit.connectivity;
-    let mut copies = HashSet::new();
+    let mut copies = Set::default();
     let (mut vertices, mut edges) = (0, 0);
     for &f in &part.faces {
         for h in c.face_halfedges(f) {

@@ -16,6 +16,7 @@
 //! a domain that does not.
 
 mod dissolve;
+mod hashing;
 mod merge;
 mod overlap;
 mod packing;

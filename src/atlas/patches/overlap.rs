@@ -5,40 +5,62 @@
 //! exactly along a cut must be judged the same way every time. It is far above rounding and far
 //! below a texel, so an exact predicate would decide nothing better here.
 
-use std::collections::HashMap;
+use super::hashing::Map;
 
 /// A triangle of the plane.
 pub(super) type Triangle = [[f64; 2]; 3];
 
 const END: u32 = u32::MAX;
 
+/// A cell of the grid: level, column and row. A cell of level k measures 2^k.
+type Cell = (i32, i64, i64);
+
+/// What lies in a cell.
+#[derive(Clone, Copy)]
+struct Content {
+    /// First node of the list of triangles of the cell's own size.
+    own: u32,
+    /// Whether one of its four quarters holds anything.
+    is_parent: bool,
+}
+
+const EMPTY: Content = Content {
+    own: END,
+    is_parent: false,
+};
+
 /// The triangles of a patch so far, found by place.
+///
+/// A triangle is kept in the cells of its own size. Larger ones are found by going up from there, smaller ones by going
+/// down into the quarters that hold anything.
 pub(super) struct TriangleIndex {
-    triangles: Vec<(Triangle, i32)>,
-    /// Triangles of the cell's own size.
-    own: HashMap<(i32, i64, i64), u32>,
-    /// Triangles of the cell's own size or smaller.
-    all: HashMap<(i32, i64, i64), u32>,
+    triangles: Vec<Triangle>,
+    cells: Map<Cell, Content>,
     /// Linked lists: triangle and next node.
     nodes: Vec<(u32, u32)>,
-    /// Least and greatest level of any triangle that will come; a cell of level k measures 2^k.
+    /// Least and greatest level of any triangle that will come.
     levels: [i32; 2],
+    /// Levels that have triangles of their own, by their place above the least.
+    used: [bool; DEPTH + 1],
     /// Deepest overlap that still counts as touching.
     tolerance: f64,
 }
+
+/// Levels below that of the largest triangle: finer than a thousandth of it pays no more.
+const DEPTH: usize = 10;
 
 impl TriangleIndex {
     /// For triangles whose bounding boxes measure `sizes[0]` to `sizes[1]`. Others are found as well,
     /// only more slowly.
     pub fn new(sizes: [f64; 2], tolerance: f64) -> TriangleIndex {
         let largest = level(sizes[1]);
+        let least = level(sizes[0]).clamp(largest - DEPTH as i32, largest);
         TriangleIndex {
             triangles: Vec::new(),
-            own: HashMap::new(),
-            all: HashMap::new(),
+            cells: Map::default(),
             nodes: Vec::new(),
-            // Finer than a thousandth of the largest pays no more.
-            levels: [level(sizes[0]).clamp(largest - 10, largest), largest],
+            levels: [least, largest],
+            used: [false; DEPTH + 1],
             tolerance,
         }
     }
@@ -51,40 +73,84 @@ impl TriangleIndex {
     pub fn insert(&mut self, t: Triangle) {
         let id = self.triangles.len() as u32;
         let own = self.level_of(&t);
-        self.triangles.push((t, own));
-        let nodes = &mut self.nodes;
-        let mut push = |map: &mut HashMap<_, u32>, key| {
-            let head = map.entry(key).or_insert(END);
-            nodes.push((id, *head));
-            *head = (nodes.len() - 1) as u32;
-        };
+        self.used[(own - self.levels[0]) as usize] = true;
+        self.triangles.push(t);
         for (x, y) in cells(&t, own) {
-            push(&mut self.own, (own, x, y));
-        }
-        for k in own..=self.levels[1] {
-            for (x, y) in cells(&t, k) {
-                push(&mut self.all, (k, x, y));
+            let content = self.cells.entry((own, x, y)).or_insert(EMPTY);
+            let is_new = content.own == END && !content.is_parent;
+            self.nodes.push((id, content.own));
+            content.own = (self.nodes.len() - 1) as u32;
+            let (mut at, mut go_on) = ((own, x, y), is_new);
+            // Parents know already where anything was there before.
+            while go_on && at.0 < self.levels[1] {
+                // Shifts round down, as cells do.
+                at = (at.0 + 1, at.1 >> 1, at.2 >> 1);
+                let parent = self.cells.entry(at).or_insert(EMPTY);
+                go_on = parent.own == END && !parent.is_parent;
+                parent.is_parent = true;
             }
         }
     }
 
     /// True where the triangle overlaps one that was added.
     pub fn overlaps(&self, t: &Triangle) -> bool {
+        self.overlaps_by(t, self.tolerance)
+    }
+
+    /// The same with a tolerance of its own.
+    pub fn overlaps_by(&self, t: &Triangle, tolerance: f64) -> bool {
         let own = self.level_of(t);
-        (own..=self.levels[1]).any(|k| {
-            let map = if k == own { &self.all } else { &self.own };
+        let larger = |k: &i32| self.used[(k - self.levels[0]) as usize];
+        let mut below: Vec<Cell> = Vec::new();
+        for (x, y) in cells(t, own) {
+            let Some(content) = self.cells.get(&(own, x, y)) else {
+                continue;
+            };
+            if self.meets_list(t, content.own, tolerance) {
+                return true;
+            }
+            if content.is_parent {
+                below.push((own, x, y));
+            }
+        }
+        if (own + 1..=self.levels[1]).filter(larger).any(|k| {
             cells(t, k).any(|(x, y)| {
-                let mut node = map.get(&(k, x, y)).copied().unwrap_or(END);
-                while node != END {
-                    let (id, next) = self.nodes[node as usize];
-                    if overlap(t, &self.triangles[id as usize].0, self.tolerance) {
-                        return true;
-                    }
-                    node = next;
-                }
-                false
+                let content = self.cells.get(&(k, x, y));
+                content.is_some_and(|content| self.meets_list(t, content.own, tolerance))
             })
-        })
+        }) {
+            return true;
+        }
+        while let Some((k, x, y)) = below.pop() {
+            let [xs, ys] = cell_range(t, k - 1);
+            for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| (2 * x + i, 2 * y + j)) {
+                if !(xs.contains(&x) && ys.contains(&y)) {
+                    continue;
+                }
+                let Some(content) = self.cells.get(&(k - 1, x, y)) else {
+                    continue;
+                };
+                if self.meets_list(t, content.own, tolerance) {
+                    return true;
+                }
+                if content.is_parent {
+                    below.push((k - 1, x, y));
+                }
+            }
+        }
+        false
+    }
+
+    /// True where the triangle overlaps one of a list.
+    fn meets_list(&self, t: &Triangle, mut node: u32, tolerance: f64) -> bool {
+        while node != END {
+            let (id, next) = self.nodes[node as usize];
+            if overlap(t, &self.triangles[id as usize], tolerance) {
+                return true;
+            }
+            node = next;
+        }
+        false
     }
 }
 
@@ -108,11 +174,23 @@ fn level(size: f64) -> i32 {
 }
 
 fn cells(t: &Triangle, level: i32) -> impl Iterator<Item = (i64, i64)> + use<> {
-    let cell = f64::from(level).exp2();
-    let (low, high) = bounds(t);
-    let at = |x: f64| (x / cell).floor() as i64;
-    let (xs, ys) = (at(low[0])..=at(high[0]), at(low[1])..=at(high[1]));
+    let [xs, ys] = cell_range(t, level);
     xs.flat_map(move |x| ys.clone().map(move |y| (x, y)))
+}
+
+/// Columns and rows of the cells that a triangle's bounding box touches.
+fn cell_range(t: &Triangle, level: i32) -> [std::ops::RangeInclusive<i64>; 2] {
+    // A power of two: dividing by it and multiplying by its inverse are the same.
+    let per_unit = f64::from(-level).exp2();
+    let (low, high) = bounds(t);
+    let at = |x: f64| floor(x * per_unit);
+    [0, 1].map(|i| at(low[i])..=at(high[i]))
+}
+
+/// The greatest whole number that is not greater; saturates. (The library's function is a call on older processors.)
+fn floor(x: f64) -> i64 {
+    let whole = x as i64;
+    whole.saturating_sub(i64::from((whole as f64) > x))
 }
 
 /// True where two counterclockwise triangles overlap by more than `tolerance`, that is, where no side
@@ -132,9 +210,13 @@ fn separates(a: &Triangle, b: &Triangle, tolerance: f64) -> bool {
     (0..3).any(|k| {
         let (p, q) = (a[k], a[(k + 1) % 3]);
         let d = [q[0] - p[0], q[1] - p[1]];
-        let limit = tolerance * d[0].hypot(d[1]);
-        b.iter()
-            .all(|r| d[0] * (r[1] - p[1]) - d[1] * (r[0] - p[0]) <= limit)
+        let farthest = b.iter().fold(f64::NEG_INFINITY, |m, r| {
+            m.max(d[0] * (r[1] - p[1]) - d[1] * (r[0] - p[0]))
+        });
+        // The side's length is seldom needed, and its root costs more than the rest.
+        farthest <= 0.0
+            || farthest <= tolerance * 1.5 * (d[0].abs() + d[1].abs())
+                && farthest <= tolerance * d[0].hypot(d[1])
     })
 }
 

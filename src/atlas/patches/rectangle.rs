@@ -7,7 +7,7 @@
 
 use super::segment::{Placement, place};
 use super::slit::Slit;
-use crate::atlas::plane::{Similarity, rotate, wrap_angle};
+use crate::atlas::plane::{Similarity, rotate, rotation, wrap_angle};
 use crate::geometry::ids::FaceId;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -38,7 +38,7 @@ pub(super) fn orient(slit: &Slit, faces: &[FaceId], own: &mut [[f64; 2]]) -> Ori
         .copied()
         .max_by_key(|&f| (area_bits(f), std::cmp::Reverse(f)))
         .unwrap_or(FaceId::new(0));
-    let set: std::collections::HashSet<FaceId> = faces.iter().copied().collect();
+    let set: super::hashing::Set<FaceId> = faces.iter().copied().collect();
     let member = |f: FaceId| set.contains(&f);
     let placement = place(slit, faces.iter().copied(), root, highest, member, own);
     let mut frame = Frame::new(slit, faces, &placement, slit.is_deep(highest));
@@ -51,8 +51,9 @@ pub(super) fn orient(slit: &Slit, faces: &[FaceId], own: &mut [[f64; 2]]) -> Ori
                 frame = Frame::new(slit, faces, &placement, true);
                 // Turned like the central chart, so that both ways give one orientation.
                 let turn = fit(slit, faces, &frame.corners, 1.0).rotation;
+                let turned = rotation(turn);
                 for p in frame.corners.iter_mut().flatten() {
-                    *p = rotate(*p, turn);
+                    *p = turned(*p);
                 }
             }
         }
@@ -72,10 +73,10 @@ impl Frame {
     }
 
     fn orient(self, slit: &Slit, faces: &[FaceId]) -> Oriented {
-        let points: Vec<[f64; 2]> = self.corners.iter().flatten().copied().collect();
-        let angle = best_angle(&convex_hull(points.clone()));
-        let turned = |p: [f64; 2]| rotate(p, -angle);
-        let (low, high) = extents(points.iter().map(|&p| turned(p)));
+        let points = || self.corners.iter().flatten().copied();
+        let angle = best_angle(&convex_hull(outer(points)));
+        let turned = rotation(-angle);
+        let (low, high) = extents(points().map(&turned));
         let width = high[0] - low[0];
         // A patch without any extent keeps its coordinates.
         let width = if width > 0.0 { width } else { 1.0 };
@@ -152,6 +153,42 @@ fn extents(points: impl Iterator<Item = [f64; 2]>) -> ([f64; 2], [f64; 2]) {
     })
 }
 
+/// The points that may be corners of the convex hull: what lies well inside the octagon of those farthest out is left out, which
+/// is nearly all of a patch.
+fn outer<P: Iterator<Item = [f64; 2]>>(points: impl Fn() -> P) -> Vec<[f64; 2]> {
+    const DIRECTIONS: usize = 8;
+    /// Rounding is far less than this part of the distance between two points.
+    const WELL: f64 = 1e-9;
+    let along: [[f64; 2]; DIRECTIONS] = std::array::from_fn(|i| {
+        let (s, c) = (TAU * i as f64 / DIRECTIONS as f64).sin_cos();
+        [c, s]
+    });
+    let mut farthest = [(f64::NEG_INFINITY, [0.0; 2]); DIRECTIONS];
+    for p in points() {
+        for (d, best) in along.iter().zip(&mut farthest) {
+            let reach = d[0] * p[0] + d[1] * p[1];
+            if reach > best.0 {
+                *best = (reach, p);
+            }
+        }
+    }
+    // Left of each side of the octagon by more than rounding could be wrong.
+    let sides: [([f64; 2], [f64; 2]); DIRECTIONS] = std::array::from_fn(|i| {
+        let (p, q) = (farthest[i].1, farthest[(i + 1) % DIRECTIONS].1);
+        (p, [q[0] - p[0], q[1] - p[1]])
+    });
+    let sides: Vec<_> = sides.into_iter().filter(|s| s.1 != [0.0; 2]).collect();
+    let size = farthest.iter().fold(0.0, |m: f64, f| m.max(f.0.abs()));
+    let is_inside = |p: &[f64; 2]| {
+        !sides.is_empty()
+            && sides.iter().all(|(from, d)| {
+                let turn = d[0] * (p[1] - from[1]) - d[1] * (p[0] - from[0]);
+                turn > WELL * size * (d[0].abs() + d[1].abs())
+            })
+    };
+    points().filter(|p| !is_inside(p)).collect()
+}
+
 /// Corners of the convex hull, counterclockwise (Andrew's monotone chain with an exact predicate).
 fn convex_hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
@@ -197,7 +234,7 @@ fn best_angle(hull: &[[f64; 2]]) -> f64 {
     let rank = |angle: f64| {
         // Modulo a quarter turn, and the same just below it as just above.
         let angle = (angle + 1e-6).rem_euclid(FRAC_PI_2) - 1e-6;
-        let (low, high) = extents(hull.iter().map(|&p| rotate(p, -angle)));
+        let (low, high) = extents(hull.iter().copied().map(rotation(-angle)));
         let (w, h) = (high[0] - low[0], high[1] - low[1]);
         let area = w * h / (perimeter * perimeter).max(f64::MIN_POSITIVE);
         let angle = if h > w * (1.0 + 1e-6) {
@@ -280,6 +317,29 @@ mod tests {
             let (long, short) = (width.max(height), width.min(height));
             assert!((high[0] - low[0] - long).abs() < 1e-9 * long);
             assert!((high[1] - low[1] - short).abs() < 1e-9 * long);
+        }
+    }
+
+    #[test]
+    fn what_is_left_out_inside_does_not_change_the_hull() {
+        let mut state = 77u64;
+        let mut random = || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 33) as f64 / (1u64 << 31) as f64
+        };
+        for [width, height] in [[1.0, 1.0], [1.0, 1e-3], [1e-40, 2e-40], [1.0, 0.0]] {
+            // Far from the origin too, where rounding is largest.
+            for offset in [0.0, 100.0] {
+                let offset = offset * width;
+                let points: Vec<[f64; 2]> = (0..2000)
+                    .map(|_| [width * random() + offset, height * random() - offset])
+                    .collect();
+                let few = outer(|| points.iter().copied());
+                assert!(height == 0.0 || few.len() < 1500);
+                assert_eq!(convex_hull(few), convex_hull(points.clone()));
+            }
         }
     }
 

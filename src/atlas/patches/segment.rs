@@ -29,6 +29,10 @@ const GROWTH: f64 = 0.9;
 /// not do: a patch may be a thousandth of it, and what touches there overlaps in the patch.
 pub(super) const TOUCHING: f64 = 1e-10;
 
+/// Faces that overlap by no more than this part of the tolerance are clear of each other: parts of what was grown of such faces
+/// need no second look at their own, smaller extent unless it is smaller by as much.
+const CLEAR: f64 = 1e-2;
+
 /// Rounds of merging and dividing: each can make the other possible again, hardly ever often.
 const ROUNDS: usize = 3;
 
@@ -117,6 +121,8 @@ pub(super) fn segment(slit: &Slit, range: f64) -> Vec<Vec<FaceId>> {
     let mut sets = Sets {
         slit,
         stamp: FaceVec::filled(0, slit.connectivity.face_count()),
+        copy_stamp: vec![0; slit.development.copies],
+        sides: FaceVec::filled(0, slit.connectivity.face_count()),
         last: 0,
     };
     let total: f64 = slit.source_area.iter().sum();
@@ -197,7 +203,7 @@ fn cover(
         let stamp = sets.mark(&region);
         let member = |f| sets.stamp[f] == stamp;
         let placement = place(slit, region.iter().copied(), seed, highest, member, own);
-        let grown = grow(sets, &region, seed, stamp, &placement);
+        let (grown, is_clear) = grow(sets, &region, seed, stamp, &placement);
         let stamp = sets.mark(&grown);
         let left_over = region.iter().filter(|&&f| sets.stamp[f] != stamp);
         rest.extend(left_over.copied());
@@ -208,7 +214,10 @@ fn cover(
             // then it loses a face at least.
             let positions = placement.positions;
             let closer = Placement::new(slit, positions, disk.iter().copied());
-            if closer.is_injective(slit, &disk) {
+            // The first growth has often shown it.
+            let is_known = closer.extent == placement.extent
+                || is_clear && closer.tolerance() >= CLEAR * placement.tolerance();
+            if is_known || closer.is_injective(slit, &disk) {
                 disks.push(disk);
             } else {
                 stack.push(disk);
@@ -275,6 +284,10 @@ fn best_window(slit: &Slit, sorted: &[FaceId], range: f64) -> [f64; 2] {
 struct Sets<'a> {
     slit: &'a Slit<'a>,
     stamp: FaceVec<u32>,
+    /// The same for copies.
+    copy_stamp: Vec<u32>,
+    /// Scratch space of [`halves`].
+    sides: FaceVec<u8>,
     last: u32,
 }
 
@@ -286,6 +299,20 @@ impl Sets<'_> {
             self.stamp[f] = self.last;
         }
         self.last
+    }
+
+    /// Euler characteristic of a set of faces: 1 for a connected set that is a disk.
+    fn euler_characteristic(&mut self, faces: &[FaceId]) -> i64 {
+        let (slit, set) = (self.slit, self.mark(faces));
+        let (mut copies, mut inner) = (0, 0);
+        for &f in faces {
+            for copy in slit.copies(f) {
+                copies += i64::from(std::mem::replace(&mut self.copy_stamp[copy], set) != set);
+            }
+            inner += slit.neighbours(f).filter(|&n| self.stamp[n] == set).count();
+        }
+        let edges = (3 * faces.len() - inner / 2) as i64;
+        copies - edges + faces.len() as i64
     }
 
     /// Connected components on the slit disk, each in the order given, by their first face.
@@ -350,14 +377,15 @@ pub(super) fn centroid(t: &Triangle) -> [f64; 2] {
     std::array::from_fn(|i| (t[0][i] + t[1][i] + t[2][i]) / 3.0)
 }
 
-/// Faces of a region (those with the stamp) that lie injectively in the plane, nearest to the seed first.
+/// Faces of a region (those with the stamp, which is taken from some) that lie injectively in the plane, nearest to the seed
+/// first; and whether all of them are clear of each other.
 fn grow(
-    sets: &Sets,
+    sets: &mut Sets,
     region: &[FaceId],
     seed: FaceId,
     stamp: u32,
     placement: &Placement,
-) -> Vec<FaceId> {
+) -> (Vec<FaceId>, bool) {
     let slit = sets.slit;
     let mut index = placement.index(slit, region);
     let start = centroid(&placement.triangle(slit, seed));
@@ -365,36 +393,31 @@ fn grow(
         let d = crate::atlas::plane::distance(centroid(t), start);
         (d / placement.extent * 1e7).round() as u64
     };
-    let mut seen = std::collections::HashSet::from([seed]);
+    sets.last += 1;
+    let seen = sets.last;
+    sets.stamp[seed] = seen;
     let mut queue = BinaryHeap::from([Reverse((0, seed))]);
     let mut grown = Vec::new();
+    let mut is_clear = true;
     while let Some(Reverse((_, f))) = queue.pop() {
         let triangle = placement.triangle(slit, f);
         // What overlaps now will always: the patch only grows.
-        if index.overlaps(&triangle) {
-            continue;
+        if index.overlaps_by(&triangle, CLEAR * placement.tolerance()) {
+            if index.overlaps(&triangle) {
+                continue;
+            }
+            is_clear = false;
         }
         index.insert(triangle);
         grown.push(f);
         for n in slit.neighbours(f) {
-            if sets.stamp[n] == stamp && seen.insert(n) {
+            if sets.stamp[n] == stamp {
+                sets.stamp[n] = seen;
                 queue.push(Reverse((key(&placement.triangle(slit, n)), n)));
             }
         }
     }
-    grown
-}
-
-/// Euler characteristic of a set of faces: 1 for a connected set that is a disk.
-pub(super) fn euler_characteristic(slit: &Slit, faces: &[FaceId]) -> i64 {
-    let copies: BTreeSet<usize> = faces.iter().flat_map(|&f| slit.copies(f)).collect();
-    let set: BTreeSet<FaceId> = faces.iter().copied().collect();
-    let inner: usize = faces
-        .iter()
-        .map(|&f| slit.neighbours(f).filter(|n| set.contains(n)).count())
-        .sum();
-    let edges = 3 * faces.len() - inner / 2;
-    copies.len() as i64 - edges as i64 + faces.len() as i64
+    (grown, is_clear)
 }
 
 /// Cuts a connected injective set into disks along straight lines through its holes.
@@ -406,7 +429,7 @@ fn split_at_holes(
 ) {
     let mut stack = vec![faces];
     while let Some(faces) = stack.pop() {
-        if euler_characteristic(sets.slit, &faces) == 1 {
+        if sets.euler_characteristic(&faces) == 1 {
             disks.push(faces);
             continue;
         }
@@ -478,6 +501,9 @@ fn area_and_middle(points: impl ExactSizeIterator<Item = [f64; 2]> + Clone) -> (
     (0.5 * doubled, middle)
 }
 
+/// Directions of the lines that are tried through a hole.
+const DIRECTIONS: usize = 8;
+
 /// The faces on both sides of the line through a point that cuts the shortest way, of eight directions.
 fn halves(
     sets: &mut Sets,
@@ -485,40 +511,48 @@ fn halves(
     centre: [f64; 2],
     placement: &Placement,
 ) -> (Vec<FaceId>, Vec<FaceId>) {
-    const DIRECTIONS: usize = 8;
     let slit = sets.slit;
     let stamp = sets.mark(faces);
-    let side = |f: FaceId, direction: [f64; 2]| {
-        let p = centroid(&placement.triangle(slit, f));
-        let cross = direction[0] * (p[1] - centre[1]) - direction[1] * (p[0] - centre[0]);
-        cross > -placement.tolerance()
-    };
-    let mut best: Option<(i64, [f64; 2])> = None;
-    for i in 0..DIRECTIONS {
+    let directions: [[f64; 2]; DIRECTIONS] = std::array::from_fn(|i| {
         // An offset that no regular grid has for a direction.
         let angle = std::f64::consts::PI * i as f64 / DIRECTIONS as f64 + 0.1234;
-        let direction = [angle.cos(), angle.sin()];
-        let left = faces.iter().filter(|&&f| side(f, direction)).count();
-        if left == 0 || left == faces.len() {
-            continue;
+        [angle.cos(), angle.sin()]
+    });
+    // A bit a line, set for the faces on its left.
+    let tolerance = placement.tolerance();
+    let mut count = [0; DIRECTIONS];
+    for &f in faces {
+        let p = centroid(&placement.triangle(slit, f));
+        let p = [p[0] - centre[0], p[1] - centre[1]];
+        let mut sides = 0;
+        for (i, d) in directions.iter().enumerate() {
+            let is_left = d[0] * p[1] - d[1] * p[0] > -tolerance;
+            sides |= u8::from(is_left) << i;
+            count[i] += usize::from(is_left);
         }
-        let mut cut = 0.0;
-        for &f in faces.iter().filter(|&&f| side(f, direction)) {
-            for h in slit.connectivity.face_halfedges(f) {
-                let Some(t) = slit.across(h) else { continue };
-                let n = slit.connectivity.face(t);
-                if sets.stamp[n] == stamp && !side(n, direction) {
-                    cut += slit.length[slit.connectivity.edge(h)];
+        sets.sides[f] = sides;
+    }
+    let mut cut = [0.0; DIRECTIONS];
+    for &f in faces {
+        for h in slit.connectivity.face_halfedges(f) {
+            let Some(t) = slit.across(h) else { continue };
+            let n = slit.connectivity.face(t);
+            // Hardly any two neighbours have a line between them.
+            let between = sets.sides[f] & !sets.sides[n];
+            if between != 0 && sets.stamp[n] == stamp {
+                for (i, cut) in cut.iter_mut().enumerate() {
+                    if between >> i & 1 == 1 {
+                        *cut += slit.length[slit.connectivity.edge(h)];
+                    }
                 }
             }
         }
-        let key = rounded_ln(cut / placement.extent);
-        if best.is_none_or(|b| key < b.0) {
-            best = Some((key, direction));
-        }
     }
+    let best = (0..DIRECTIONS)
+        .filter(|&i| count[i] > 0 && count[i] < faces.len())
+        .min_by_key(|&i| (rounded_ln(cut[i] / placement.extent), i));
     match best {
-        Some((_, direction)) => partition(faces, |f| side(f, direction)),
+        Some(i) => partition(faces, |f| sets.sides[f] >> i & 1 == 1),
         // No line through the point divides them: take off one face, which is a disk.
         None => (faces[..1].to_vec(), faces[1..].to_vec()),
     }

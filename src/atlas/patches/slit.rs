@@ -6,6 +6,7 @@
 //! *own*, developed from the flat lengths around one face. The second is taken where the first
 //! would be too coarse ([`Slit::is_deep`]).
 
+use super::hashing::{Map, Set};
 use crate::atlas::cut::CutGraph;
 use crate::atlas::develop::{Development, Unfolded};
 use crate::atlas::overlay::Layout;
@@ -14,7 +15,7 @@ use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, HalfedgeId, HalfedgeVec, VertexVec};
 use crate::geometry::mesh::{Mesh, distance, triangle_area};
 use std::cmp::Reverse;
-use std::collections::{BinaryHeap, HashMap, HashSet};
+use std::collections::BinaryHeap;
 
 /// A region whose expected extent is less than this part of the chart's diameter is placed in its own
 /// frame. Central coordinates are good to about 1e-13 of the diameter after the development, hence
@@ -162,8 +163,8 @@ impl<'a> Slit<'a> {
             return;
         };
         let mut faces = vec![root];
-        let mut listed = HashSet::from([root]);
-        let mut cells = HashSet::new();
+        let mut listed = Set::from_iter([root]);
+        let mut cells = Set::default();
         let mut next = 0;
         while let Some(&f) = faces.get(next) {
             next += 1;
@@ -180,7 +181,7 @@ impl<'a> Slit<'a> {
             copy: &unfolded.copy,
         };
         let root = layout.carrier(self.connectivity.corner_halfedge(root, 0));
-        let mut placed = HashMap::new();
+        let mut placed = Map::default();
         under.develop(
             layout.connectivity.face(root.halfedge),
             |f| cells.contains(&layout.cell[f]),
@@ -252,8 +253,8 @@ impl Disk<'_> {
         mut put: impl FnMut(u32, [f64; 2]),
     ) {
         let c = self.connectivity;
-        let mut placed: HashMap<u32, [f64; 2]> = HashMap::new();
-        let mut visited = HashSet::from([root]);
+        let mut placed: Map<u32, [f64; 2]> = Map::default();
+        let mut visited = Set::from_iter([root]);
         let mut queue: BinaryHeap<(u64, Reverse<HalfedgeId>)> = BinaryHeap::new();
         // Non-negative floats compare like their bits.
         let key = |h: HalfedgeId| (self.length[c.edge(h)].to_bits(), Reverse(h));
@@ -270,7 +271,7 @@ impl Disk<'_> {
         let (a, b) = (place(a, [-half, 0.0]), place(b, [half, 0.0]));
         let apex = place(apex, self.apex(first, a, b));
         let ends = [(a, b), (b, apex), (apex, a)];
-        let mut between = HashMap::new();
+        let mut between = Map::default();
         for (h, ends) in c.face_halfedges(root).into_iter().zip(ends) {
             between.insert(h, ends);
             queue.push(key(h));

@@ -151,7 +151,9 @@ impl DepthMap {
     fn visible(&self, p: Vec3, n: Vec3) -> f32 {
         // Off the surface by more than a texel, or every point would shade itself.
         let [x, y, near] = self.place(along(p, 1.6 / self.scale, n));
-        let (column, row) = ((x - 0.5).floor(), (y - 0.5).floor());
+        // Rounded down by casts: the library's function is a call on older processors.
+        let floor = |x: f64| (x as i64 - i64::from((x as i64 as f64) > x)) as f64;
+        let (column, row) = (floor(x - 0.5), floor(y - 0.5));
         let (fx, fy) = ((x - 0.5 - column) as f32, (y - 0.5 - row) as f32);
         let mut sum = 0.0;
         for (dx, wx) in [(0.0, 1.0 - fx), (1.0, fx)] {

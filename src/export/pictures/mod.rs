@@ -12,10 +12,13 @@
 //! surface, `light` bakes soft light into the vertices, and `raster` finds which triangle each sample of each
 //! pixel sees; what that sample looks like is computed afterwards, once a sample.
 //!
+//! Directions are chosen and light is baked on a stand-in of bounded size (`coarse`) where a surface has very many faces.
+//!
 //! Not guaranteed: equal bytes on different platforms (sines and powers differ in the last bit).
 
 mod canvas;
 mod checkerboard;
+mod coarse;
 mod colour;
 mod convergence;
 mod floor;

@@ -78,14 +78,25 @@ pub fn covered(
     let range = |axis: usize, first: usize, end: usize| {
         let low = a[axis].min(b[axis]).min(c[axis]);
         let high = a[axis].max(b[axis]).max(c[axis]);
-        let from = (low - 0.5).ceil().max(first as f64) as usize;
-        // Saturates at 0 for what lies before the screen.
-        let to = ((high - 0.5).floor() + 1.0).min(end as f64).max(0.0) as usize;
+        // Rounded up and down by casts, which saturate; the library's functions are calls on older processors.
+        let low = (low - 0.5).max(first as f64);
+        let from = low as usize + usize::from((low as usize as f64) < low);
+        let high = high - 0.5;
+        let to = if high < 0.0 {
+            0
+        } else {
+            (high as usize).saturating_add(1).min(end)
+        };
         from..to
     };
     let columns = range(0, 0, end[0]);
+    let rows = range(1, top, end[1]);
+    // Most faces of a fine mesh lie between samples.
+    if columns.is_empty() || rows.is_empty() {
+        return;
+    }
     let sides = [(b, c), (c, a), (a, b)].map(|(from, to)| Side::new(from, to, area));
-    for row in range(1, top, end[1]) {
+    for row in rows {
         let y = row as f64 + 0.5;
         let rises = sides
             .each_ref()

@@ -1,6 +1,7 @@
 //! Pictures of the surface in space.
 
 use super::checkerboard::{Checkerboard, weighted_quantile};
+use super::coarse::{Coarse, coarse};
 use super::colour::{CUT, INK, Linear, NEGATIVE, POSITIVE, diverging, mix, to_bytes, to_linear};
 use super::floor::Floor;
 use super::light::{Shade, bake};
@@ -21,6 +22,10 @@ const SAMPLES: usize = 3;
 const BAND: usize = 16;
 /// Faces that meet at less than this share a smooth normal: cosine of 40°.
 const CREASE: f64 = 0.766;
+/// Surfaces of more faces have a stand-in where the direction is chosen, with so many cells along their longest side …
+const VIEWED: (usize, u32) = (60_000, 96);
+/// … and where light is baked.
+const LIT: (usize, u32) = (200_000, 192);
 
 /// The surface with a checkerboard in flat coordinates, cones (red where the curvature is positive, blue where it is
 /// negative) and the cut; `size` × `size` pixels.
@@ -57,9 +62,14 @@ pub(super) struct Studio<'a> {
     camera: Camera,
     positions: &'a [Vec3],
     faces: Vec<[u32; 3]>,
-    /// Unit normals of the corners.
+    /// Vertices of the surface and, after those, of the marks, on the screen.
+    screen: Vec<Vec3>,
+    /// Objects that some sample sees, a list a band: faces of the surface and, after those, of the marks.
+    seen: Vec<Vec<u32>>,
+    /// Unit normals of the corners of faces that are seen, and where they stand for each face.
     normals: Vec<[Vec3; 3]>,
-    /// Light on the outside and on the inside of every vertex; of a closed surface on the outside only.
+    normals_of: Vec<u32>,
+    /// Light on the outside and on the inside of every vertex that is seen; of a closed surface on the outside only.
     shade: [Vec<Shade>; 2],
     marks: Marks,
     mark_shade: Vec<Shade>,
@@ -79,7 +89,14 @@ impl<'a> Studio<'a> {
         let connectivity = &atlas.mesh.connectivity;
         let positions = atlas.mesh.positions.as_slice();
         let faces = connectivity.to_faces();
-        let direction = choose_direction(positions, &faces);
+        let vertex_normals = vertex_normals(positions, &faces);
+        let stand_in = |(least, cells): (usize, u32)| -> Option<Coarse> {
+            (faces.len() > least).then(|| coarse(positions, &vertex_normals, &faces, cells))
+        };
+        let direction = match stand_in(VIEWED) {
+            Some(few) => choose_direction(&few.positions, &few.faces),
+            None => choose_direction(positions, &faces),
+        };
         let side = size * SAMPLES;
         let camera = Camera::looking_from(direction, positions, side as f64);
         let oriented = |r: f64, u: f64, b: f64| {
@@ -89,49 +106,118 @@ impl<'a> Studio<'a> {
             }))
         };
         let (lamp, fill) = (oriented(-0.55, 0.75, 0.55), oriented(0.8, 0.15, 0.5));
-        // One bake for everything that is lit: outside, inside where it can be seen, marks and floor.
-        let vertex_normals = vertex_normals(positions, &faces);
         let marks = marks(atlas, &camera, side as f64);
-        let mut floor = Floor::new(positions);
-        let sides: &[f64] = if connectivity.is_closed() {
-            &[1.0]
-        } else {
-            &[1.0, -1.0]
-        };
-        let mut points: Vec<(Vec3, Vec3)> = Vec::new();
-        for sign in sides {
-            let normals = vertex_normals.iter().map(|n| n.map(|x| sign * x));
-            points.extend(positions.iter().copied().zip(normals));
-        }
-        points.extend(
-            marks
-                .positions
-                .iter()
-                .copied()
-                .zip(marks.normals.iter().copied()),
-        );
-        points.extend(floor.points());
-        let up = [0.0, 1.0, 0.0];
-        let mut shades = bake(&points, positions, &faces, lamp, up).into_iter();
-        let mut take = |count: usize| -> Vec<Shade> { shades.by_ref().take(count).collect() };
-        let outside = take(positions.len());
-        let inside = take((sides.len() - 1) * positions.len());
-        let mark_shade = take(marks.positions.len());
-        floor.shade = shades.collect();
-        Studio {
+        let on_screen = positions.iter().chain(&marks.positions);
+        let screen = on_screen.map(|&p| camera.project(p)).collect();
+        let lit = stand_in(LIT).unwrap_or_else(|| Coarse {
+            positions: positions.to_vec(),
+            faces: faces.clone(),
+        });
+        let mut studio = Studio {
             atlas,
             size,
-            normals: corner_normals(connectivity, positions),
-            shade: [outside, inside],
+            screen,
+            seen: Vec::new(),
+            normals: Vec::new(),
+            normals_of: Vec::new(),
+            shade: Default::default(),
+            mark_shade: Vec::new(),
             marks,
-            mark_shade,
-            floor,
+            floor: Floor::new(positions),
             camera,
             positions,
             faces,
             lamp,
             fill,
             side,
+        };
+        studio.seen = studio.look();
+        studio.light(&vertex_normals, &lit);
+        studio.smooth();
+        studio
+    }
+
+    /// The objects that some sample sees, a list a band, each in their order.
+    fn look(&self) -> Vec<Vec<u32>> {
+        let bands = self.size.div_ceil(BAND);
+        // Of all objects those that reach into a band, so that each draws only its own.
+        let mut members: Vec<Vec<u32>> = vec![Vec::new(); bands];
+        for object in 0..self.faces.len() + self.marks.faces.len() {
+            let rows = self.on_screen(object).map(|p| p[1]);
+            let low = rows.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = rows.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let band = |row: f64| (row / (BAND * SAMPLES) as f64).max(0.0) as usize;
+            if low <= high && low < self.side as f64 && high >= 0.0 {
+                for member in &mut members[band(low)..=band(high).min(bands - 1)] {
+                    member.push(object as u32);
+                }
+            }
+        }
+        let seen = |(b, member): (usize, &Vec<u32>)| {
+            let band = self.raster(b * BAND, member);
+            let rows = b * BAND * SAMPLES..((b + 1) * BAND * SAMPLES).min(self.side);
+            let mut seen: Vec<u32> = rows
+                .flat_map(|y| (0..self.side).map(move |x| (x, y)))
+                .map(|(x, y)| band.object(x, y))
+                .filter(|&object| object != NOTHING)
+                .collect();
+            seen.sort_unstable();
+            seen.dedup();
+            seen
+        };
+        members.par_iter().enumerate().map(seen).collect()
+    }
+
+    /// Lights what is seen: outside, inside where it can be seen, marks and floor, all in one bake.
+    fn light(&mut self, vertex_normals: &[Vec3], lit: &Coarse) {
+        let mut is_seen = vec![false; self.positions.len()];
+        for &object in self.seen.iter().flatten() {
+            if let Some(face) = self.faces.get(object as usize) {
+                face.iter().for_each(|&v| is_seen[v as usize] = true);
+            }
+        }
+        let vertices: Vec<usize> = (0..is_seen.len()).filter(|&v| is_seen[v]).collect();
+        let sides: &[f64] = if self.atlas.mesh.connectivity.is_closed() {
+            &[1.0]
+        } else {
+            &[1.0, -1.0]
+        };
+        let mut points: Vec<(Vec3, Vec3)> = Vec::new();
+        for sign in sides {
+            let normal = |v: usize| vertex_normals[v].map(|x| sign * x);
+            points.extend(vertices.iter().map(|&v| (self.positions[v], normal(v))));
+        }
+        let marks = self.marks.positions.iter().zip(&self.marks.normals);
+        points.extend(marks.map(|(&p, &n)| (p, n)));
+        points.extend(self.floor.points());
+        let up = [0.0, 1.0, 0.0];
+        let mut shades = bake(&points, &lit.positions, &lit.faces, self.lamp, up).into_iter();
+        for (shade, _) in self.shade.iter_mut().zip(sides) {
+            shade.resize(self.positions.len(), Shade::default());
+            for (&v, of) in vertices.iter().zip(shades.by_ref()) {
+                shade[v] = of;
+            }
+        }
+        let marks = self.marks.positions.len();
+        self.mark_shade = shades.by_ref().take(marks).collect();
+        self.floor.shade = shades.collect();
+    }
+
+    /// Finds the normals at the corners of what is seen.
+    fn smooth(&mut self) {
+        let connectivity = &self.atlas.mesh.connectivity;
+        let normals = face_normals(connectivity, self.positions);
+        self.normals_of = vec![NOTHING; self.faces.len()];
+        for &object in self.seen.iter().flatten() {
+            let Some(place) = self.normals_of.get_mut(object as usize) else {
+                continue;
+            };
+            // A face can be seen in two bands.
+            if *place == NOTHING {
+                *place = self.normals.len() as u32;
+                let f = FaceId::new(object as usize);
+                self.normals.push(corner_normals(connectivity, &normals, f));
+            }
         }
     }
 
@@ -187,26 +273,21 @@ impl<'a> Studio<'a> {
         }
     }
 
-    fn draw(&self, paint: &Paint) -> RgbImage {
-        let size = self.size;
-        let objects = self.faces.len() + self.marks.faces.len();
-        let bands = size.div_ceil(BAND);
-        // Triangles of every band, in their order, so that each band draws only its own.
-        let mut members: Vec<Vec<u32>> = vec![Vec::new(); bands];
-        for object in 0..objects {
-            let rows = self.corners(object).map(|p| self.camera.project(p)[1]);
-            let low = rows.iter().copied().fold(f64::INFINITY, f64::min);
-            let high = rows.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            let band = |row: f64| (row / (BAND * SAMPLES) as f64).max(0.0) as usize;
-            if low <= high && low < self.side as f64 && high >= 0.0 {
-                for member in &mut members[band(low)..=band(high).min(bands - 1)] {
-                    member.push(object as u32);
-                }
+    /// The same on the screen.
+    fn on_screen(&self, object: usize) -> [Vec3; 3] {
+        match self.faces.get(object) {
+            Some(face) => face.map(|v| self.screen[v as usize]),
+            None => {
+                let face = self.marks.faces[object - self.faces.len()];
+                face.map(|v| self.screen[self.positions.len() + v as usize])
             }
         }
-        let pixels: Vec<[u8; 3]> = members
-            .par_iter()
-            .enumerate()
+    }
+
+    fn draw(&self, paint: &Paint) -> RgbImage {
+        let size = self.size;
+        // What no sample sees hides nothing, and is left out.
+        let pixels: Vec<[u8; 3]> = (self.seen.par_iter().enumerate())
             .flat_map_iter(|(b, member)| self.draw_band(b * BAND, member, paint))
             .collect();
         RgbImage::from_fn(size as u32, size as u32, |x, y| {
@@ -214,16 +295,20 @@ impl<'a> Studio<'a> {
         })
     }
 
+    /// The objects given as the samples of a band see them; `top` is its first row of pixels.
+    fn raster(&self, top: usize, member: &[u32]) -> Band {
+        let rows = BAND.min(self.size - top);
+        let mut band = Band::new(self.side, top * SAMPLES, rows * SAMPLES);
+        for &object in member {
+            band.draw(&self.on_screen(object as usize), object);
+        }
+        band
+    }
+
     fn draw_band(&self, top: usize, member: &[u32], paint: &Paint) -> Vec<[u8; 3]> {
         let size = self.size;
         let rows = BAND.min(size - top);
-        let mut band = Band::new(self.side, top * SAMPLES, rows * SAMPLES);
-        for &object in member {
-            let screen = self
-                .corners(object as usize)
-                .map(|p| self.camera.project(p));
-            band.draw(&screen, object);
-        }
+        let band = self.raster(top, member);
         let mut pixels = Vec::with_capacity(rows * size);
         for row in top..top + rows {
             for column in 0..size {
@@ -294,7 +379,7 @@ impl<'a> Studio<'a> {
     }
 
     fn shaded(&self, at: [f64; 2], samples: &[Sample], object: usize, paint: &Paint) -> Linear {
-        let screen = self.corners(object).map(|p| self.camera.project(p));
+        let screen = self.on_screen(object);
         let (weights, depth) = weights(&screen, at);
         let blend = |of: &dyn Fn(usize) -> Vec3| -> Vec3 {
             unit(std::array::from_fn(|i| {
@@ -316,7 +401,8 @@ impl<'a> Studio<'a> {
         if let Some(&face) = self.faces.get(object) {
             let [a, b, c] = self.corners(object);
             let behind = dot(cross(sub(b, a), sub(c, a)), toward_eye) < 0.0;
-            let mut normal = blend(&|k| self.normals[object][k]);
+            let corners = &self.normals[self.normals_of[object] as usize];
+            let mut normal = blend(&|k| corners[k]);
             if behind {
                 normal = normal.map(|x| -x);
             }
@@ -417,34 +503,33 @@ fn vertex_normals(positions: &[Vec3], faces: &[[u32; 3]]) -> Vec<Vec3> {
     sums.into_iter().map(unit).collect()
 }
 
-/// Unit normals of the corners: the mean over the faces at the vertex that meet at a small angle.
-fn corner_normals(connectivity: &Connectivity, positions: &[Vec3]) -> Vec<[Vec3; 3]> {
-    let normals: Vec<(Vec3, f64)> = connectivity
+/// Unit normal and twice the area of every face.
+fn face_normals(connectivity: &Connectivity, positions: &[Vec3]) -> Vec<(Vec3, f64)> {
+    connectivity
         .faces()
         .map(|f| {
             let [a, b, c] = connectivity.face_vertices(f).map(|v| positions[v.index()]);
             let n = cross(sub(b, a), sub(c, a));
             (unit(n), norm(n))
         })
-        .collect();
-    connectivity
-        .faces()
-        .map(|f| {
-            let own = normals[f.index()].0;
-            [0, 1, 2].map(|k| {
-                let v = connectivity.tail(connectivity.corner_halfedge(f, k));
-                let sum = connectivity.outgoing(v).fold([0.0; 3], |sum, h| {
-                    let (n, weight) = normals[connectivity.face(h).index()];
-                    if dot(n, own) > CREASE {
-                        along(sum, weight, n)
-                    } else {
-                        sum
-                    }
-                });
-                unit(sum)
-            })
-        })
         .collect()
+}
+
+/// Unit normals of the corners of a face: the mean over the faces at the vertex that meet at a small angle.
+fn corner_normals(connectivity: &Connectivity, normals: &[(Vec3, f64)], f: FaceId) -> [Vec3; 3] {
+    let own = normals[f.index()].0;
+    [0, 1, 2].map(|k| {
+        let v = connectivity.tail(connectivity.corner_halfedge(f, k));
+        let sum = connectivity.outgoing(v).fold([0.0; 3], |sum, h| {
+            let (n, weight) = normals[connectivity.face(h).index()];
+            if dot(n, own) > CREASE {
+                along(sum, weight, n)
+            } else {
+                sum
+            }
+        });
+        unit(sum)
+    })
 }
 
 /// Balls at the cones and bars along the cut, sized for the picture.
