@@ -6,13 +6,13 @@
 //!
 //! Every single step keeps all patches disks, injective and inside the range of log scale.
 
-use super::hashing::Set;
 use super::merge::around;
 use super::overlap::overlap;
 use super::segment::{Placement, TOUCHING, borders, centroid, place};
 use super::slit::Slit;
 use crate::atlas::plane;
 use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId};
+use rustc_hash::FxHashSet as Set;
 use std::collections::BTreeSet;
 
 /// Patches of more faces are not divided: their neighbours would become ragged.

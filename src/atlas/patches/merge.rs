@@ -1,10 +1,10 @@
 //! Neighbouring patches joined while their union is still a disk, injective, and within the range of
 //! log scale. Smallest first, so that crumbs disappear into what surrounds them.
 
-use super::hashing::Set;
 use super::segment::{borders, place, rounded_ln};
 use super::slit::Slit;
 use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId};
+use rustc_hash::FxHashSet as Set;
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
 

@@ -16,7 +16,6 @@
 //! a domain that does not.
 
 mod dissolve;
-mod hashing;
 mod merge;
 mod overlap;
 mod packing;

@@ -5,7 +5,7 @@
 //! exactly along a cut must be judged the same way every time. It is far above rounding and far
 //! below a texel, so an exact predicate would decide nothing better here.
 
-use super::hashing::Map;
+use rustc_hash::FxHashMap as Map;
 
 /// A triangle of the plane.
 pub(super) type Triangle = [[f64; 2]; 3];

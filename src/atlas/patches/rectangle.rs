@@ -38,7 +38,7 @@ pub(super) fn orient(slit: &Slit, faces: &[FaceId], own: &mut [[f64; 2]]) -> Ori
         .copied()
         .max_by_key(|&f| (area_bits(f), std::cmp::Reverse(f)))
         .unwrap_or(FaceId::new(0));
-    let set: super::hashing::Set<FaceId> = faces.iter().copied().collect();
+    let set: rustc_hash::FxHashSet<FaceId> = faces.iter().copied().collect();
     let member = |f: FaceId| set.contains(&f);
     let placement = place(slit, faces.iter().copied(), root, highest, member, own);
     let mut frame = Frame::new(slit, faces, &placement, slit.is_deep(highest));

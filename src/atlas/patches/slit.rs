@@ -6,7 +6,6 @@
 //! *own*, developed from the flat lengths around one face. The second is taken where the first
 //! would be too coarse ([`Slit::is_deep`]).
 
-use super::hashing::{Map, Set};
 use crate::atlas::cut::CutGraph;
 use crate::atlas::develop::{Development, Unfolded};
 use crate::atlas::overlay::Layout;
@@ -14,6 +13,7 @@ use crate::atlas::plane;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, HalfedgeId, HalfedgeVec, VertexVec};
 use crate::geometry::mesh::{Mesh, distance, triangle_area};
+use rustc_hash::{FxHashMap as Map, FxHashSet as Set};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
