@@ -76,6 +76,7 @@ pub fn converge(file: &Path) -> Result<(), String> {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     let mut failures = Vec::new();
     let (mut steps, mut flips, mut worst, mut range) = (Vec::new(), Vec::new(), 0.0f64, 0.0f64);
+    let mut refined: Vec<f64> = Vec::new();
     let start = Instant::now();
     for seed in 0..SEEDS {
         let prescription = random(&model, seed, RANGE);
@@ -85,6 +86,9 @@ pub fn converge(file: &Path) -> Result<(), String> {
                 steps.push(last.iteration);
                 flips.push(flat.history.iter().map(|s| s.flips).sum::<usize>());
                 worst = worst.max(flat.max_curvature_error);
+                let x = flat.intrinsic.as_ref().unwrap();
+                let crossings = x.base_on_flat.crossings().map_err(|e| e.to_string())?;
+                refined.push(1.0 + crossings as f64 / x.base.vertex_count() as f64);
                 let u = flat.log_scale.iter();
                 let (low, high) = u.fold((f64::MAX, f64::MIN), |(a, b), &u| (a.min(u), b.max(u)));
                 range = range.max(high - low);
@@ -95,9 +99,10 @@ pub fn converge(file: &Path) -> Result<(), String> {
     }
     steps.sort_unstable();
     flips.sort_unstable();
+    refined.sort_unstable_by(f64::total_cmp);
     let middle = |list: &[usize]| list.get(list.len() / 2).copied().unwrap_or(0);
     println!(
-        "{name:22} {:7} vertices, {:2} of {SEEDS}, steps {} … {} … {}, flips {} … {}, |K − K̄| ≤ {worst:.1e}, range of u ≤ {range:.1}, {:.2} s each",
+        "{name:22} {:7} vertices, {:2} of {SEEDS}, steps {} … {} … {}, flips {} … {}, overlay ×{:.2} … {:.2}, |K − K̄| ≤ {worst:.1e}, range of u ≤ {range:.1}, {:.2} s each",
         model.connectivity.vertex_count(),
         steps.len(),
         steps.first().unwrap_or(&0),
@@ -105,6 +110,8 @@ pub fn converge(file: &Path) -> Result<(), String> {
         steps.last().unwrap_or(&0),
         middle(&flips),
         flips.last().unwrap_or(&0),
+        refined.get(refined.len() / 2).unwrap_or(&f64::NAN),
+        refined.last().unwrap_or(&f64::NAN),
         start.elapsed().as_secs_f64() / SEEDS as f64
     );
     match failures.is_empty() {
