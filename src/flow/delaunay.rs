@@ -432,8 +432,9 @@ mod tests {
             }
             let mut delaunay = Delaunay::new(shape.connectivity, &shape.length, Vec::new());
             delaunay.flip_in_the_surface();
-            let mut direct = Metric::flipping(delaunay.clone());
-            let mut roundabout = Metric::flipping(delaunay);
+            let mut copy = delaunay.clone();
+            let mut direct = Metric::flipping(&mut copy);
+            let mut roundabout = Metric::flipping(&mut delaunay);
             let n = direct.connectivity().vertex_count();
             let mut random_u = |range: f64| -> VertexVec<f64> {
                 (0..n).map(|_| range * (2.0 * random() - 1.0)).collect()
@@ -461,7 +462,7 @@ mod tests {
         let shape = shapes::torus(9, 7);
         let mut delaunay = Delaunay::new(shape.connectivity, &shape.length, Vec::new());
         delaunay.flip_in_the_surface();
-        let mut metric = Metric::flipping(delaunay);
+        let mut metric = Metric::flipping(&mut delaunay);
         let n = metric.connectivity().vertex_count();
         let mut random = shapes::sequence(37);
         let u: VertexVec<f64> = (0..n).map(|_| 2.0 * random() - 1.0).collect();

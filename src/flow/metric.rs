@@ -32,7 +32,7 @@ enum Surface<'a> {
     /// The connectivity stays.
     Fixed(&'a Connectivity, &'a ConformalStructure),
     /// Vertex scaling on the Delaunay triangulation at every `u`.
-    Flipping(Box<Delaunay>),
+    Flipping(&'a mut Delaunay),
 }
 
 /// What [`Metric::evaluate`] finds at one `u`.
@@ -54,10 +54,10 @@ impl<'a> Metric<'a> {
     }
 
     /// Vertex scaling with flips.
-    pub fn flipping(delaunay: Delaunay) -> Self {
+    pub fn flipping(delaunay: &'a mut Delaunay) -> Self {
         Self {
             full_angle: full_angles(&delaunay.connectivity),
-            surface: Surface::Flipping(Box::new(delaunay)),
+            surface: Surface::Flipping(delaunay),
         }
     }
 
@@ -108,14 +108,6 @@ impl<'a> Metric<'a> {
                 let parts = delaunay.scale().iter().zip(u.iter());
                 parts.map(|(scale, u)| scale + u).collect()
             }
-        }
-    }
-
-    /// The flipped triangulation, where there is one.
-    pub fn into_delaunay(self) -> Option<Delaunay> {
-        match self.surface {
-            Surface::Fixed(..) => None,
-            Surface::Flipping(delaunay) => Some(*delaunay),
         }
     }
 

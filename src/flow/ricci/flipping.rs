@@ -2,7 +2,7 @@
 //!
 //! *Enters:* connectivity A and its lengths, curvatures. *Leaves:* a [`FlatMetric`] with the three triangulations and the
 //! correspondences between them. *Guaranteed:* in exact arithmetic a solution for every prescription that meets Gauss–Bonnet with
-//! positive cone angles (Gu, Luo, Sun, Wu 2018; Springborn 2019); on a surface with boundary `u` is symmetric.
+//! positive cone angles (Gu, Luo, Sun, Wu 2018; Springborn 2019); on a surface with boundary `u` is symmetric, to rounding.
 //! *Not guaranteed:* more than float64 holds: where rounding stops the flow above the tolerance, the achieved error is stated.
 //!
 //! A surface with boundary is doubled. A boundary vertex of curvature K̄ becomes an interior one of 2K̄; a free boundary keeps u = 0 there.
@@ -48,7 +48,7 @@ pub(super) fn flow(
     delaunay.correspondences.push(Correspondence::identity(&b));
     let on_boundary = |v| surface.connectivity.is_boundary_vertex(v);
     let mut problem = Problem {
-        metric: Metric::flipping(delaunay),
+        metric: Metric::flipping(&mut delaunay),
         target: original
             .iter()
             .map(|&v| target[v] * if on_boundary(v) { 2.0 } else { 1.0 })
@@ -71,10 +71,6 @@ pub(super) fn flow(
     }
     let max_curvature_error = problem.max_error(&evaluation);
     let scale_free = problem.scale_free;
-    // The solvers return a metric of the kind they were given.
-    let Some(mut delaunay) = problem.metric.into_delaunay() else {
-        return Err(FlowError::Cancelled);
-    };
     // Newton has taken u into the lengths, the gradient flow has not.
     let rest = u.iter().zip(delaunay.scale().iter()).map(|(u, s)| u - s);
     let mut rest: VertexVec<f64> = rest.collect();
@@ -104,12 +100,8 @@ pub(super) fn flow(
     let curvature = curvature
         .map(|(v, k)| k * if on_boundary(v) { 0.5 } else { 1.0 })
         .collect();
-    let (Some(delaunay_on_flat), Some(base_on_flat)) = (
-        delaunay.correspondences.pop(),
-        delaunay.correspondences.pop(),
-    ) else {
-        return Err(FlowError::Cancelled);
-    };
+    let delaunay_on_flat = delaunay.correspondences.swap_remove(1);
+    let base_on_flat = delaunay.correspondences.swap_remove(0);
     Ok(FlatMetric {
         log_scale: u.as_slice()[..own].to_vec().into(),
         length: exponential(&length),

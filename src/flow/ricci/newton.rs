@@ -2,13 +2,15 @@
 //!
 //! Each step solves (Hessian) δ = K̄ − K. Where a constant may be added to `u`, one vertex is left out of
 //! the system, which removes the kernel without spoiling sparsity; a free boundary is left out whole. A vertex of a double and
-//! its mirror image are one unknown, so `u` is symmetric exactly.
+//! its mirror image are one unknown, so `u` is symmetric exactly, unless rounding alone keeps the error above the tolerance: then they become
+//! two, and `u` is symmetric up to that rounding.
 //!
 //! With flips every evaluation is on the Delaunay triangulation at its `u`; the energy is convex and twice continuously
 //! differentiable across flips, so nothing else changes. Flips of a rejected trial stay: the next trial undoes them where it must.
 //!
 //! A step of length s is taken when the directional derivative Σ (K − K̄) δ at its end is still ≤ 0, so the energy fell by
-//! convexity, *or* when ‖K − K̄‖₂ fell by a tenth. Insisting on the sign alone halves every step near
+//! convexity, *or* when ‖K − K̄‖₂ fell a tenth below the least so far. The second can happen only so often before the
+//! norm is 0, and in between the energy falls: the iteration cannot cycle. Insisting on the sign alone halves every step near
 //! the minimum, where rounding decides it, and turns quadratic convergence into a factor of ½ a step.
 //!
 //! After the tolerance is met, full steps are taken as long as each at least halves the error: they are cheap, and
@@ -188,6 +190,7 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
     problem.observer.flow_step(&record);
     let mut polished = 0;
     let mut remaining: f64 = 0.0;
+    let mut least = f64::INFINITY;
     loop {
         if problem.observer.cancelled() {
             return Err(FlowError::Cancelled);
@@ -197,7 +200,12 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
         if converged && (settled || polished == POLISHING_STEPS) {
             break;
         }
+        // Near the end a full step either lowers the error or rounding is the limit.
+        let near = converged || record.max_error <= FLOAT64_FLOOR;
         if !converged && record.iteration >= params.max_newton_steps {
+            if near {
+                break;
+            }
             return Err(problem.not_converged(record.iteration, &now));
         }
         let range = spread(&problem.metric.total(&u));
@@ -208,8 +216,7 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
             system = System::new(problem, Some(system))?;
         }
         let hessian = system.assemble(problem, &weight);
-        // Near the end a full step either lowers the error or rounding is the limit.
-        let near = converged || record.max_error <= FLOAT64_FLOOR;
+        least = least.min(dot(&residual, &residual).sqrt());
         let taken = if near {
             polished += 1;
             let falls = if converged { 0.5 } else { 1.0 };
@@ -227,7 +234,7 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
         } else {
             SHIFTS.iter().find_map(|&shift| {
                 let direction = system.direction(&hessian, shift, &residual)?;
-                let step = line_search(problem, &u, &direction, &residual, &mut trial)?;
+                let step = line_search(problem, &u, &direction, &residual, least, &mut trial)?;
                 Some((direction, step))
             })
         };
@@ -297,24 +304,25 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
     })
 }
 
-/// The first of 1, ½, ¼ … that is accepted (see the module docs), with its evaluation in `trial`.
+/// The first of 1, ½, ¼ … that is accepted (see the module docs), with its evaluation in `trial`. `least` is the least ‖K − K̄‖₂
+/// of all iterates so far.
 fn line_search(
     problem: &mut Problem,
     u: &VertexVec<f64>,
     direction: &VertexVec<f64>,
     residual: &VertexVec<f64>,
+    least: f64,
     trial: &mut Evaluation,
 ) -> Option<f64> {
     let largest = direction.iter().map(|d| d.abs()).fold(0.0, f64::max);
     if !largest.is_finite() || dot(residual, direction) >= 0.0 {
         return None;
     }
-    let norm = dot(residual, residual).sqrt();
     let mut step = (LARGEST_CHANGE / largest).min(1.0);
     while step >= SMALLEST_STEP {
         problem.metric.evaluate(&moved(u, direction, step), trial);
         let next = problem.residual(trial);
-        if dot(&next, direction) <= 0.0 || dot(&next, &next).sqrt() <= 0.9 * norm {
+        if dot(&next, direction) <= 0.0 || dot(&next, &next).sqrt() <= 0.9 * least {
             return Some(step);
         }
         step *= 0.5;
