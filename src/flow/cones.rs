@@ -34,6 +34,7 @@ use crate::geometry::connectivity::Topology;
 use crate::geometry::ids::{VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
 use std::f64::consts::{PI, TAU};
+use std::path::PathBuf;
 
 /// Largest miss of Gauss–Bonnet, radians, that counts as rounding of what the user wrote; it is then shared out
 /// among the cones.
@@ -108,6 +109,17 @@ pub enum ConeStrategy {
     None,
 }
 
+/// What the automatic choice of cones makes least.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ConeObjective {
+    /// Standard deviation of the log scale over the area: shrinking counts as much as growing.
+    #[default]
+    LogScale,
+    /// Area distortion (9): ruled by what grows; parts that shrink to nothing cost no more than their area.
+    AreaDistortion,
+}
+
 /// A cone that the user names by vertex or by point.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -130,8 +142,26 @@ pub struct ConeParams {
     pub strategy: ConeStrategy,
     /// Cones by name; not empty means strategy `listed`.
     pub list: Vec<ConeSpec>,
-    /// Number of cones for `spread`, at least 1.
+    /// Number of cones for `spread`, at least 1; the most that `auto` places in the interior.
     pub count: usize,
+    /// For `auto`: as few cones as keep |log scale − mean| below this where `count` allows; absent: `count` of them, as far as they pay.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub log_scale_bound: Option<f64>,
+    /// For `auto`: K̄ of every cone is a multiple of this; 0: any.
+    pub quantum: PiMultiple,
+    /// For `auto`: what is made least.
+    pub objective: ConeObjective,
+    /// For `auto`: least K̄ of a cone, in multiples of π.
+    pub min_curvature: PiMultiple,
+    /// For `auto`: greatest K̄ of a cone, in multiples of π, below 2.
+    pub max_curvature: PiMultiple,
+    /// For `auto`: least distance of a cone to the boundary, in square roots of the component's area.
+    pub boundary_distance: f64,
+    /// File with cones, one a line: vertex and curvature in radians.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+    /// Number of the first vertex in `file`: 0 or 1.
+    pub file_first_vertex: u32,
     /// K̄ of each cone for `spread`, in multiples of π; absent: what Gauss–Bonnet leaves, in equal parts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub curvature: Option<PiMultiple>,
@@ -146,6 +176,14 @@ impl Default for ConeParams {
             strategy: ConeStrategy::Auto,
             list: Vec::new(),
             count: 8,
+            log_scale_bound: None,
+            quantum: PiMultiple::literal(0, 1),
+            objective: ConeObjective::default(),
+            min_curvature: PiMultiple::literal(-4, 1),
+            max_curvature: PiMultiple::literal(3, 2),
+            boundary_distance: 0.0,
+            file: None,
+            file_first_vertex: 0,
             curvature: None,
             vertex: None,
         }

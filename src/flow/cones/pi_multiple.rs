@@ -17,6 +17,12 @@ enum Form {
 }
 
 impl PiMultiple {
+    /// A multiple that this program itself names; a denominator of 0 counts as 1.
+    pub(crate) const fn literal(numerator: i64, denominator: u8) -> Self {
+        let denominator = if denominator == 0 { 1 } else { denominator };
+        Self(Form::Fraction(numerator, denominator as i64))
+    }
+
     /// `numerator / denominator · π`; `None` where the denominator is not positive.
     pub fn fraction(numerator: i64, denominator: i64) -> Option<Self> {
         (denominator > 0).then_some(Self(Form::Fraction(numerator, denominator)))
