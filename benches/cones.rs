@@ -39,7 +39,12 @@ fn main() -> Result<(), Box<dyn Error>> {
                         objective,
                         ..ConeParams::default()
                     };
-                    measure(&format!("{name} level {level}"), &mesh, &params, arguments.runs)?;
+                    measure(
+                        &format!("{name} level {level}"),
+                        &mesh,
+                        &params,
+                        arguments.runs,
+                    )?;
                 }
             }
         }
