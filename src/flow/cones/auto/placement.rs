@@ -54,6 +54,8 @@ pub(super) struct Placement<'a> {
     base_energy: f64,
     /// b of every vertex.
     slope: Vec<f64>,
+    /// B(v, v) of every vertex.
+    self_energy: Vec<f64>,
     /// Where the search begins.
     samples: Vec<usize>,
 }
@@ -90,6 +92,7 @@ impl<'a> Placement<'a> {
         let mut placement = Self {
             base_energy: 0.0,
             slope: Vec::new(),
+            self_energy: picture.self_energies(&sink),
             samples: sample(connectivity, &allowed, &base, SAMPLES),
             base,
             picture,
@@ -208,7 +211,7 @@ impl<'a> Placement<'a> {
             let explained: f64 = (0..size)
                 .map(|i| row[i] * dot(&inverse[i * size..][..size], row))
                 .sum();
-            let own = self.picture.self_energy[v];
+            let own = self.self_energy[v];
             let s = (own - explained).max(1e-6 * own);
             let c = first.unwrap_or((-e / s).clamp(low, high));
             match c == 0.0 {
