@@ -54,6 +54,8 @@ pub(super) struct Placement<'a> {
     base_energy: f64,
     /// b of every vertex.
     slope: Vec<f64>,
+    /// B(v, v) of every vertex.
+    pub(super) self_energy: Vec<f64>,
     /// Where the search begins.
     pub(super) samples: Vec<usize>,
 }
@@ -90,6 +92,7 @@ impl<'a> Placement<'a> {
         let mut placement = Self {
             base_energy: 0.0,
             slope: Vec::new(),
+            self_energy: picture.self_energies(&sink),
             samples: sample(connectivity, &allowed, &base, SAMPLES),
             base,
             picture,
@@ -177,13 +180,32 @@ impl<'a> Placement<'a> {
         }
     }
 
-    /// The vertex that is worth most beside `choice`, and the variance that it promises.
-    fn best_addition(&self, choice: &Choice) -> Option<(usize, f64)> {
-        let sites = &choice.sites;
+    /// Vertices that are worth most beside `choice`, and the variance that each promises at the least.
+    ///
+    /// Where curvatures are at a limit, two are named: one for cones that stay there, and one for cones that need not, because the new one
+    /// relieves them. The second matters most where too few cones must make up the total and all are at their limits.
+    fn best_additions(&self, choice: &Choice) -> Vec<(usize, f64)> {
+        let mut found: Vec<(usize, f64)> = Vec::new();
+        if choice.best.is_inside.iter().any(|inside| !inside) {
+            let unlimited = Limits {
+                range: [f64::NEG_INFINITY, f64::INFINITY],
+                ..self.limits
+            };
+            let relieved = self.program(&choice.sites).minimise(unlimited);
+            found.extend(relieved.and_then(|best| self.best_beside(&choice.sites, &best)));
+        }
+        if let Some(other) = self.best_beside(&choice.sites, &choice.best)
+            && found.iter().all(|one| one.0 != other.0)
+        {
+            found.push(other);
+        }
+        found
+    }
+
+    /// The vertex that is worth most beside cones of given curvatures, and the variance that it promises.
+    fn best_beside(&self, sites: &[Site], chosen: &Best) -> Option<(usize, f64)> {
         let has_total = self.limits.total.is_some();
-        let inside: Vec<usize> = (0..sites.len())
-            .filter(|&i| choice.best.is_inside[i])
-            .collect();
+        let inside: Vec<usize> = (0..sites.len()).filter(|&i| chosen.is_inside[i]).collect();
         let system = self
             .program(sites)
             .system(&inside, has_total && !inside.is_empty());
@@ -198,14 +220,14 @@ impl<'a> Placement<'a> {
         let first = sites.is_empty().then_some(self.limits.total).flatten();
         let taken = |v: usize| !self.allowed[v] || sites.iter().any(|s| s.vertex == v);
         let gain = |v: usize, row: &mut Vec<f64>| -> f64 {
-            let e = choice.best.multiplier + self.derivative(v, sites, &choice.best.curvature);
+            let e = chosen.multiplier + self.derivative(v, sites, &chosen.curvature);
             row.clear();
             row.extend(inside.iter().map(|&i| sites[i].column[v]));
             row.resize(size, 1.0);
             let explained: f64 = (0..size)
                 .map(|i| row[i] * dot(&inverse[i * size..][..size], row))
                 .sum();
-            let own = self.picture.self_energy[v];
+            let own = self.self_energy[v];
             let s = (own - explained).max(1e-6 * own);
             let c = first.unwrap_or((-e / s).clamp(low, high));
             match c == 0.0 {
@@ -215,7 +237,7 @@ impl<'a> Placement<'a> {
             }
         };
         let best = self.climb(taken, gain)?;
-        Some((best.0, choice.energy - best.1))
+        Some((best.0, self.base_energy + chosen.energy - best.1))
     }
 
     /// The vertex worth most: the best of the samples, and from there uphill. `worth` gets a buffer of its own.
@@ -264,12 +286,21 @@ impl<'a> Placement<'a> {
         self.base_energy + self.program(sites).energy(curvature)
     }
 
+    /// The best of `sites` with one of some vertices put at a place of the list.
+    fn with_one_of(&mut self, sites: &[Site], at: usize, vertices: &[usize]) -> Option<Choice> {
+        let new = self.sites(vertices);
+        let choices = new.into_iter().filter_map(|site| {
+            let mut sites = sites.to_vec();
+            sites.insert(at, site);
+            self.choose(sites)
+        });
+        choices.reduce(|a, b| if b.energy < a.energy { b } else { a })
+    }
+
     /// Adds the best vertex; `None` where nothing can be added.
     pub(super) fn add(&mut self, choice: &Choice) -> Option<Choice> {
-        let (vertex, _) = self.best_addition(choice)?;
-        let mut sites = choice.sites.clone();
-        sites.extend(self.sites(&[vertex]));
-        self.choose(sites)
+        let vertices: Vec<usize> = self.best_additions(choice).iter().map(|v| v.0).collect();
+        self.with_one_of(&choice.sites, choice.sites.len(), &vertices)
     }
 
     /// Takes away one cone.
@@ -288,14 +319,12 @@ impl<'a> Placement<'a> {
         while stayed < count && looked < PASSES * count {
             looked += 1;
             let moved = self.without(&choice, next).and_then(|rest| {
-                let (vertex, promised) = self.best_addition(&rest)?;
-                if promised > choice.energy * (1.0 - least_gain) {
-                    return None;
-                }
-                let mut sites = rest.sites;
-                let site = self.sites(&[vertex]);
-                sites.splice(next..next, site);
-                self.choose(sites)
+                let vertices = self.best_additions(&rest).into_iter();
+                let vertices: Vec<usize> = vertices
+                    .filter(|v| v.1 <= choice.energy * (1.0 - least_gain))
+                    .map(|v| v.0)
+                    .collect();
+                self.with_one_of(&rest.sites, next, &vertices)
             });
             match moved.filter(|moved| moved.energy < choice.energy * (1.0 - least_gain)) {
                 Some(moved) => {

@@ -214,7 +214,7 @@ fn best_place(
             let rest = placement.energy(&others, &curvature);
             let worth = |v: usize, _: &mut Vec<f64>| {
                 let e = placement.derivative(v, &others, &curvature);
-                -c * (2.0 * e + c * placement.picture.self_energy[v])
+                -c * (2.0 * e + c * placement.self_energy[v])
             };
             let taken = |v: usize| !placement.allowed[v] || others.iter().any(|s| s.vertex == v);
             let (vertex, gain) = placement.climb(taken, worth)?;

@@ -1,0 +1,149 @@
+//! The automatic choice of cones: better than what other tools choose, near the best there is, and the same whatever does not matter.
+//!
+//! `AFFINE_ATLAS_CORPUS` names a folder of real models; without it, cases that need one are reported as ignored. With
+//! `--nocapture`, every case prints the rows that `benches/README.md` shows.
+
+#[path = "../../benches/common/mod.rs"]
+mod common;
+mod defaults;
+mod dense;
+mod linear;
+mod models;
+mod optimality;
+mod peers;
+mod quantum;
+mod stability;
+mod symmetry;
+
+use affine_atlas::flow::cones::{BoundaryCondition, ConeObjective};
+use libtest_mimic::{Arguments, Failed, Trial};
+use std::path::{Path, PathBuf};
+
+/// The clean models.
+const MODELS: [&str; 18] = [
+    "spot.obj",
+    "bunny-closed.off",
+    "nefertiti.obj",
+    "fandisk.off",
+    "bumpy-cube.obj",
+    "rocker-arm.obj",
+    "kitten.obj",
+    "brezel.obj",
+    "three-holes.off",
+    "elephant-genus3.obj",
+    "fertility.off",
+    "face.obj",
+    "camelhead.off",
+    "lilium.obj",
+    "lego.ply",
+    "punctured-torus.obj",
+    "stanford-bunny.obj",
+    "beetle.obj",
+];
+/// The closed ones of genus 0.
+const SPHERES: [&str; 5] = [
+    "spot.obj",
+    "bunny-closed.off",
+    "nefertiti.obj",
+    "fandisk.off",
+    "bumpy-cube.obj",
+];
+/// Where finer meshes must get the same cones; with a boundary, under which condition.
+const STABLE: [(&str, BoundaryCondition); 10] = [
+    ("spot.obj", BoundaryCondition::Free),
+    ("bunny-closed.off", BoundaryCondition::Free),
+    ("bumpy-cube.obj", BoundaryCondition::Free),
+    ("fandisk.off", BoundaryCondition::Free),
+    ("nefertiti.obj", BoundaryCondition::Free),
+    ("rocker-arm.obj", BoundaryCondition::Free),
+    ("three-holes.off", BoundaryCondition::Free),
+    ("kitten.obj", BoundaryCondition::Free),
+    ("face.obj", BoundaryCondition::Free),
+    ("face.obj", BoundaryCondition::Uniform),
+];
+/// Small ones with and without handles and boundary.
+const VARIED: [&str; 5] = [
+    "spot.obj",
+    "bunny-closed.off",
+    "rocker-arm.obj",
+    "three-holes.off",
+    "lilium.obj",
+];
+const OBJECTIVES: [ConeObjective; 2] = [ConeObjective::LogScale, ConeObjective::AreaDistortion];
+
+fn main() {
+    let arguments = Arguments::from_args();
+    let corpus = std::env::var_os("AFFINE_ATLAS_CORPUS").map(PathBuf::from);
+    let mut trials = Vec::new();
+    for objective in OBJECTIVES {
+        for (name, peer) in [("bff", &peers::BFF[..]), ("ceps", &peers::CEPS[..])] {
+            let case = move |corpus: &Path| peers::beaten(corpus, peer, objective);
+            let name = format!("peers/{name}/{objective:?}");
+            trials.push(trial(name, corpus.clone(), case));
+        }
+        for (model, condition) in STABLE {
+            let case = move |corpus: &Path| {
+                stability::subdivision(&corpus.join(model), condition, objective)
+            };
+            let name = format!("subdivision/{objective:?}/{model}, {}", condition.name());
+            trials.push(trial(name, corpus.clone(), case));
+        }
+        for model in VARIED {
+            let case = move |corpus: &Path| stability::invariance(&corpus.join(model), objective);
+            let name = format!("invariance/{objective:?}/{model}");
+            trials.push(trial(name, corpus.clone(), case));
+        }
+        let case = move |_: &Path| symmetry::platonic(objective);
+        trials.push(trial(format!("platonic/{objective:?}"), here(), case));
+        let case = move |_: &Path| symmetry::mirror(objective);
+        trials.push(trial(format!("mirror/{objective:?}"), here(), case));
+        let case = move |corpus: &Path| quantum::quarter_turns(corpus, objective);
+        trials.push(trial(
+            format!("quantum/{objective:?}"),
+            corpus.clone(),
+            case,
+        ));
+    }
+    for model in MODELS {
+        let case = move |corpus: &Path| defaults::beside_spread(&corpus.join(model));
+        trials.push(trial(format!("default/{model}"), corpus.clone(), case));
+    }
+    for model in [
+        "spot.obj",
+        "bunny-closed.off",
+        "rocker-arm.obj",
+        "brezel.obj",
+    ] {
+        let case = move |corpus: &Path| linear::prediction(&corpus.join(model));
+        trials.push(trial(format!("prediction/{model}"), corpus.clone(), case));
+        for objective in OBJECTIVES {
+            let case = move |corpus: &Path| linear::stationary(&corpus.join(model), objective);
+            let name = format!("stationary/{objective:?}/{model}");
+            trials.push(trial(name, corpus.clone(), case));
+        }
+    }
+    for shape in optimality::SHAPES {
+        let case = move |_: &Path| optimality::brute_force(shape);
+        trials.push(trial(format!("optimality/{shape:?}"), here(), case));
+    }
+    libtest_mimic::run(&arguments, trials).exit();
+}
+
+/// For cases that need no model.
+fn here() -> Option<PathBuf> {
+    Some(PathBuf::new())
+}
+
+/// A case that is ignored where what it needs is not there.
+fn trial(
+    name: String,
+    folder: Option<PathBuf>,
+    run: impl FnOnce(&Path) -> Result<(), String> + Send + 'static,
+) -> Trial {
+    let ignored = folder.is_none();
+    let trial = Trial::test(name, move || match folder {
+        Some(folder) => run(&folder).map_err(Failed::from),
+        None => Ok(()),
+    });
+    trial.with_ignored_flag(ignored)
+}
