@@ -237,6 +237,43 @@ pub enum ConeError {
         /// Why.
         reason: String,
     },
+    /// Too few cones for their total.
+    #[error(
+        "cones.count = {count}, but cones must add up to {} here, and within cones.min_curvature and cones.max_curvature that takes {least}: raise cones.count or widen the limits",
+        in_pi(*total)
+    )]
+    TooFewCones {
+        /// Most that are asked for.
+        count: usize,
+        /// Fewest that are needed.
+        least: usize,
+        /// What they must add up to, radians.
+        total: f64,
+    },
+    /// The total is no multiple of the quantum.
+    #[error(
+        "cones must add up to {} here, which is no multiple of cones.quantum = {}: choose a quantum that divides it",
+        in_pi(*total), in_pi(*quantum)
+    )]
+    NotInQuanta {
+        /// Radians.
+        quantum: f64,
+        /// Radians.
+        total: f64,
+    },
+    /// No cones of whole quanta have the total.
+    #[error(
+        "no {count} cones within cones.min_curvature and cones.max_curvature are multiples of cones.quantum = {} and add up to {}: raise cones.count, widen the limits, or lower the quantum",
+        in_pi(*quantum), in_pi(*total)
+    )]
+    NoQuanta {
+        /// Radians.
+        quantum: f64,
+        /// Radians.
+        total: f64,
+        /// Most that are asked for.
+        count: usize,
+    },
     /// Not four corners.
     #[error(
         "a rectangle has 4 corners, but boundary.corners names {given}: name 4, or none to have them chosen"
