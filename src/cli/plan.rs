@@ -3,7 +3,7 @@
 use super::arguments::Inputs;
 use super::problem::Problem;
 use affine_atlas::config::assets::{Asset, name_assets};
-use affine_atlas::config::{self, Config, Loaded};
+use affine_atlas::config::{self, Config};
 use std::path::{Path, PathBuf};
 
 /// What is to be done.
@@ -39,11 +39,7 @@ pub fn plan(inputs: &Inputs, out: Option<&Path>) -> Result<Plan, Problem> {
     };
     let mut loaded = match file {
         Some(file) => config::load(file, &inputs.set)?,
-        None => Loaded {
-            config: config::parse("defaults", "", &inputs.set)?,
-            input_base: PathBuf::new(),
-            output_base: PathBuf::new(),
-        },
+        None => config::defaults(&inputs.set)?,
     };
     if !meshes.is_empty() {
         loaded.config.input.paths = meshes.into_iter().cloned().collect();
