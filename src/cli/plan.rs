@@ -74,8 +74,9 @@ impl Plan {
 
     /// Refuses a plan in which an asset's folder, which is replaced as a whole, holds an input:
     /// `build spot/spot.obj --out .` must not delete `spot/spot.obj`.
-    pub fn keep_inputs(&self) -> Result<(), Problem> {
-        for folder in self.assets.iter().map(|asset| self.folder(asset)) {
+    /// `folder` is that of an asset.
+    pub fn keep_inputs(&self, folder: impl Fn(&Asset) -> PathBuf) -> Result<(), Problem> {
+        for folder in self.assets.iter().map(folder) {
             let Ok(real) = folder.canonicalize() else {
                 continue; // Does not exist, so nothing is in it.
             };
@@ -167,10 +168,12 @@ mod tests {
         std::fs::write(&mesh, "").expect("written");
         let inside = plan(&inputs(&[&mesh], &[]), Some(folder.path())).expect("planned");
         assert!(matches!(
-            inside.keep_inputs(),
+            inside.keep_inputs(|asset| inside.folder(asset)),
             Err(Problem::OverwritesInput { .. })
         ));
         let beside = plan(&inputs(&[&mesh], &[]), Some(&inner)).expect("planned");
-        beside.keep_inputs().expect("spot/spot does not exist");
+        beside
+            .keep_inputs(|asset| beside.folder(asset))
+            .expect("spot/spot does not exist");
     }
 }

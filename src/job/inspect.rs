@@ -171,6 +171,6 @@ fn listed(vertices: &[u32]) -> String {
 }
 
 /// A count with its noun.
-fn counted(count: usize, one: &str, several: &str) -> String {
+pub(super) fn counted(count: usize, one: &str, several: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { several })
 }
