@@ -93,7 +93,8 @@ pub fn distortion(mesh: &Mesh, metric: &FlatMetric) -> Distortion {
 /// Length of the cut in space, source units.
 pub fn cut_length(mesh: &Mesh, cut: &CutGraph) -> f64 {
     let edges = cut.is_cut.enumerate().filter(|&(_, &is_cut)| is_cut);
-    edges.map(|(e, _)| mesh.edge_length(e)).sum()
+    // The sum of nothing is −0.
+    edges.map(|(e, _)| mesh.edge_length(e)).sum::<f64>() + 0.0
 }
 
 /// (9) for the areas of the chart, log scale and angle error; faces without area in space have no scale and are left out.

@@ -7,6 +7,7 @@
 mod error;
 mod flatten;
 mod inspect;
+mod listing;
 pub mod survey;
 
 pub use error::BuildError;

@@ -235,3 +235,22 @@ fn an_exchange_swaps_two_folders() {
         println!("skipped: no exchange of folders here: {error}");
     }
 }
+
+#[test]
+fn one_kind_of_folder_never_replaces_another() {
+    let root = tempfile::tempdir().unwrap();
+    let begin = |contents, name| Staging::begin_in(registry(), contents, root.path(), name);
+    let cones = begin(Contents::Cones, "spot.cones").unwrap();
+    cones.write("cones.json", b"{}").unwrap();
+    cones.write("spot.cones-8.component-000.png", b"").unwrap();
+    cones.publish().unwrap();
+    let refused = begin(Contents::Atlas, "spot.cones").map(|_| ());
+    assert!(matches!(refused, Err(ExportError::ForeignFolder { .. })));
+    begin(Contents::Cones, "spot.cones").unwrap();
+
+    let atlas = begin(Contents::Atlas, "spot").unwrap();
+    atlas.write("atlas.json", b"{}").unwrap();
+    atlas.publish().unwrap();
+    let refused = begin(Contents::Cones, "spot").map(|_| ());
+    assert!(matches!(refused, Err(ExportError::ForeignFolder { .. })));
+}

@@ -14,6 +14,9 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Radii of cones over that of one of ±π/2, least and greatest.
 const CONE_SIZES: [f64; 2] = [0.45, 2.2];
+/// Pixels of the strip with the bar of colours, and panels from which on there is one.
+const STRIP: usize = 132;
+const LEAST_BARRED: usize = 320;
 /// Pixels above and below the titles.
 const MARGIN: usize = 8;
 
@@ -58,18 +61,16 @@ impl<'a> Gallery<'a> {
         let side = self.studio.size;
         let lines = panels.iter().map(|p| p.title.len()).max().unwrap_or(0);
         let head = lines * LINE + 2 * MARGIN;
-        let width = (side * panels.len()).max(1);
+        // The bar of colours has a place of its own, beside panels that have room for it.
+        let strip = if side >= LEAST_BARRED { STRIP } else { 0 };
+        let width = (side * panels.len() + strip).max(1);
         let mut image = RgbImage::from_pixel(width as u32, (side + head) as u32, Rgb(PAPER));
         for (k, (panel, range)) in panels.iter().zip(ranges).enumerate() {
             let range = Range { reach, ..range };
             let scale = Scale::new(mesh, panel.log_scale, range);
             let paint = |face, weights, _| scale.colour(face, weights);
             let props = self.studio.place(self.marks(panel));
-            let mut drawn = self.studio.draw(&props, &Paint::Smooth(&paint));
-            if k + 1 == panels.len() {
-                let shown = Range { middle: 0.0, reach };
-                shown.bar(&mut drawn, "u - median");
-            }
+            let drawn = self.studio.draw(&props, &Paint::Smooth(&paint));
             let left = k * side;
             imageops::replace(&mut image, &drawn, left as i64, head as i64);
             for (line, words) in panel.title.iter().enumerate() {
@@ -77,6 +78,13 @@ impl<'a> Gallery<'a> {
                 let y = (MARGIN + line * LINE + LINE / 2) as f64;
                 text::write(&mut image, words, [middle, y], Anchor::Middle, INK);
             }
+        }
+        if strip > 0 {
+            let mut bar = RgbImage::from_pixel(strip as u32, side as u32, Rgb(PAPER));
+            let shown = Range { middle: 0.0, reach };
+            shown.bar(&mut bar, "u - median");
+            let left = side * panels.len();
+            imageops::replace(&mut image, &bar, left as i64, head as i64);
         }
         image
     }

@@ -21,7 +21,7 @@ impl Range {
     /// ends of the scale.
     pub fn of(mesh: &Mesh, values: &[f64]) -> Range {
         // By area, for splits crowd the vertices around cones.
-        let mut areas = vec![0.0; values.len()];
+        let mut areas = vec![0.0; mesh.connectivity.vertex_count()];
         for f in mesh.connectivity.faces() {
             let area = triangle_area(mesh.face_positions(f));
             for v in mesh.connectivity.face_vertices(f) {
@@ -47,7 +47,8 @@ impl Range {
             return;
         }
         let (top, bottom) = (side / 4, 3 * side / 4);
-        let left = side - 22;
+        let right = image.width() as usize;
+        let left = right.saturating_sub(22);
         for y in top..bottom {
             let t = 1.0 - 2.0 * (y - top) as f64 / (bottom - top) as f64;
             for x in left..left + 10 {
@@ -59,7 +60,7 @@ impl Range {
             let words = format!("{:+.2}", middle + t * reach);
             text::write(image, &words, [left as f64 - 6.0, y], Anchor::End, INK);
         }
-        let at = [side as f64 - 12.0, top as f64 - 18.0];
+        let at = [right as f64 - 12.0, top as f64 - 18.0];
         text::write(image, title, at, Anchor::End, INK);
     }
 }

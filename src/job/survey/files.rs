@@ -6,7 +6,7 @@ use crate::config::Config;
 use crate::export::folder::{Contents, Staging, component_name, list_files};
 use crate::export::pictures::{Gallery, Panel, encode_png};
 use crate::export::{Action, ExportError};
-use crate::flow::cones::{ConeSpec, ConeStrategy, file, in_pi};
+use crate::flow::cones::{ConeSpec, ConeStrategy, file};
 use crate::observe::Observer;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -222,13 +222,9 @@ fn configuration(
         }
         if section == "cones" && !list.is_empty() {
             text.push_str("list = [\n");
-            for (cone, (_, radians)) in list.iter().zip(&choice.cones) {
-                let _ = writeln!(
-                    text,
-                    "  {}, # {}",
-                    value(cone).map_err(unwritable)?,
-                    in_pi(*radians)
-                );
+            for (cone, (vertex, _)) in list.iter().zip(&choice.cones) {
+                let curvature = value(&cone.curvature).map_err(unwritable)?;
+                let _ = writeln!(text, "  {{ vertex = {vertex}, curvature = {curvature} }},");
             }
             text.push_str("]\n");
         }
@@ -314,5 +310,24 @@ fn panel<'a>(survey: &Survey, row: &Row, figures: &'a Figures) -> Panel<'a> {
         cones: (figures.scene.cones.iter())
             .map(|cone| (cone.position, cone.curvature))
             .collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_way_from_a_folder_to_a_file() {
+        let way = |from: &str, to: &str| relative(Path::new(from), Path::new(to));
+        for (from, to, there) in [
+            ("/a/b/out/x.cones", "/a/b/x.obj", "../../x.obj"),
+            ("/a/b/out/x.cones", "/a/c/x.obj", "../../../c/x.obj"),
+            ("/a/out", "/a/out/x.obj", "x.obj"),
+            ("/home/out/x.cones", "/data/x.obj", "/data/x.obj"),
+            ("/", "/x.obj", "/x.obj"),
+        ] {
+            assert_eq!(way(from, to), Path::new(there), "{from} {to}");
+        }
     }
 }

@@ -222,7 +222,11 @@ impl Task<'_> {
             component: self.index,
             components: self.repaired.components.len(),
         };
-        stages.enter("cones")?;
+        stages.enter(match strategy {
+            ConeStrategy::Spread => "spread cones",
+            ConeStrategy::None => "no cones",
+            _ => "chosen cones",
+        })?;
         let config = with_cones(self.config, strategy, asked);
         let requests = self.requests(&config)?;
         let chosen = cones::prescribe(mesh, &requests, &config.cones, &config.boundary)?;
@@ -233,7 +237,11 @@ impl Task<'_> {
             _ => chosen,
         };
         let inside = inside(mesh, &prescription);
-        let enter = |stage| stages.enter(stage);
+        // A row is one stage for who watches.
+        let enter = |_| match self.observer.cancelled() {
+            true => Err(BuildError::Cancelled),
+            false => Ok(()),
+        };
         let flat = flatten(mesh.clone(), prescription, &config, self.observer, &enter)?;
         Ok(Figures::measure(mesh, &flat, inside, specs))
     }
@@ -403,3 +411,6 @@ pub fn run(
     outcome.seconds = start.elapsed().as_secs_f64();
     (survey, outcome)
 }
+
+#[cfg(test)]
+mod tests;
