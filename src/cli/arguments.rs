@@ -103,9 +103,9 @@ Examples:
   affine-atlas cones bunny.obj --set cones.quantum=1/2 --set cones.objective=area-distortion
   affine-atlas build affine-atlas-out/bunny.cones/bunny.cones-8.toml
 
-Flattens the surface with each number of cones, chosen by the program, and shows area distortion (9),
-log scale u and length of the cut beside those of equal cones far apart (or of none, where the surface
-needs none). Each mesh gets a folder OUT/NAME.cones with, for each number N:
+Flattens the surface with each number of cones, chosen by the program, and shows area distortion
+(9), log scale u and length of the cut, beside those of equal cones far apart (of none, where the
+surface needs none). Each mesh gets a folder OUT/NAME.cones with, for each number N:
   NAME.cones-N.toml  a configuration that builds exactly this
   NAME.cones-N.txt   the same cones as two columns: vertex (from 0) and curvature in radians
   NAME.cones-N.png   the log scale before and after

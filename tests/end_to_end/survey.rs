@@ -114,7 +114,6 @@ fn a_disk_with_a_free_boundary() {
     round_trip("disk-mask.obj", "disk-mask", 5);
 }
 
-/// A surface whose total is 0: the sign of every cone is the choice's.
 #[test]
 fn a_folder_holds_what_the_help_says_and_the_same_for_any_number_of_threads() {
     let run = |threads: &str| {

@@ -120,13 +120,18 @@ fn cells(row: &Row, figures: &Figures, side: f64) -> [String; 10] {
         figures.cones.len().to_string(),
         format!("{:.4}", figures.area_distortion),
         format!("{:.4}", scale.std),
-        format!("{:+.2}", scale.min),
-        format!("{:+.2}", scale.max),
+        signed(scale.min),
+        signed(scale.max),
         format!("{:.4}π", figures.angle_error.mean / PI),
         format!("{:.4}", figures.cut_length),
         format!("{:.2}", figures.cut_length / side),
         format!("{:.1}", row.seconds),
     ]
+}
+
+/// With its sign and two decimals, and no negative zero.
+fn signed(x: f64) -> String {
+    format!("{:+.2}", (100.0 * x).round() / 100.0 + 0.0)
 }
 
 impl Survey {
