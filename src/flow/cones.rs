@@ -19,6 +19,7 @@
 //! exceeds 2πχ − π·(boundary vertices). *Not guaranteed:* that a circle packing with this curvature exists
 //! (constraint (6), see [`super::feasibility`]), nor that the cones keep the distortion low: [`spread`](ConeStrategy::Spread) knows distances only.
 
+mod auto;
 mod boundary;
 mod error;
 pub mod file;
@@ -275,7 +276,12 @@ pub fn prescribe(
     // By what name each vertex got its curvature.
     let mut named = VertexVec::filled(None, mesh.connectivity.vertex_count());
     let on_boundary = boundary::prescribed_total(&topology, requests, condition, boundary)?;
-    let chosen = choose(mesh, &topology, requests, cones, on_boundary)?;
+    let chosen = match (cones.strategy, requests.cones.is_empty()) {
+        (ConeStrategy::Auto, true) => {
+            auto::select(mesh, &topology, requests, condition, cones, boundary)?
+        }
+        _ => choose(mesh, &topology, requests, cones, on_boundary)?,
+    };
     for cone in &chosen {
         if cone.curvature == 0.0 {
             return Err(ConeError::ZeroCurvature { vertex: cone.named });

@@ -238,6 +238,14 @@ pub enum ConeError {
         /// Boundary loops.
         loops: usize,
     },
+    /// The automatic choice failed.
+    #[error(
+        "cones could not be chosen: {reason}; name cones in cones.list, or use another cones.strategy"
+    )]
+    NotChosen {
+        /// Why.
+        reason: String,
+    },
     /// Not four corners.
     #[error(
         "a rectangle has 4 corners, but boundary.corners names {given}: name 4, or none to have them chosen"

@@ -22,6 +22,7 @@ pub mod newton;
 mod params;
 #[cfg(test)]
 pub(crate) mod shapes;
+pub(crate) mod system;
 #[cfg(test)]
 mod tests;
 
@@ -115,6 +116,16 @@ pub(crate) struct Solution {
 }
 
 impl Problem<'_> {
+    fn unknowns(&self) -> system::Unknowns<'_> {
+        system::Unknowns {
+            connectivity: self.metric.connectivity(),
+            prescribed: &self.prescribed,
+            shares: &self.shares,
+            scale_free: self.scale_free,
+            flips: self.metric.flips(),
+        }
+    }
+
     /// Gradient of the energy, K − K̄, radians; 0 where `u` stays.
     fn residual(&self, evaluation: &Evaluation) -> VertexVec<f64> {
         let mut residual: VertexVec<f64> = evaluation

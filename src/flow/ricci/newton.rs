@@ -16,10 +16,10 @@
 //! After the tolerance is met, full steps are taken as long as each at least halves the error: they are cheap, and
 //! the layout profits from curvatures at the floor of float64.
 
+use super::system::System;
 use super::{FlowError, FlowStep, Problem, Solution, dot, moved};
 use crate::flow::metric::Evaluation;
-use crate::flow::solve::SymmetricSolver;
-use crate::geometry::ids::{EdgeId, EdgeVec, NONE, VertexId, VertexVec};
+use crate::geometry::ids::VertexVec;
 
 /// Largest change of `u` tried in one step: e^20 in scale. Beyond it the quadratic model means nothing.
 const LARGEST_CHANGE: f64 = 20.0;
@@ -30,9 +30,6 @@ const LARGEST_RANGE: f64 = 600.0;
 const SYMMETRY_FLOOR: f64 = 1e-9;
 /// The line search gives up below this step.
 const SMALLEST_STEP: f64 = 1e-10;
-/// Share of the edges that may be flipped before the unknowns are ordered anew: a stale order lets the factor fill up many times
-/// over (8228 flips of 0.2 million edges: four times), and costs nothing measurable below this.
-const STALE_SHARE: f64 = 2e-4;
 /// Error below which no further step is tried with flips, radians. There a solution exists always, so the last step need not be
 /// watched for scales that run away.
 const SETTLED: f64 = 1e-13;
@@ -48,122 +45,6 @@ const REMAINING_CHANGE: f64 = 0.1;
 /// the others are for Hessians that are only semidefinite, or nearly so (all faces of a vertex broken).
 const SHIFTS: [f64; 7] = [0.0, 1e-14, 1e-11, 1e-8, 1e-5, 1e-3, 1e-1];
 
-/// The Newton system on one pattern.
-struct System {
-    solver: SymmetricSolver,
-    /// Number of the unknown of a vertex, `NONE` where `u` stays.
-    unknown: VertexVec<u32>,
-    unknowns: usize,
-    /// Edges between two unknowns.
-    edge: Vec<EdgeId>,
-    /// Number of flips at which the pattern was taken.
-    flips: usize,
-    /// Number of flips at which the unknowns were ordered.
-    ordered: usize,
-}
-
-/// Diagonal and off-diagonal entries of the Hessian by unknowns, and the largest sum of absolute values in a row.
-struct Hessian {
-    diagonal: Vec<f64>,
-    off_diagonal: Vec<f64>,
-    largest: f64,
-}
-
-impl System {
-    /// The unknowns of the triangulation as it is now. Vertices that share their `u` are one unknown. The order of `last` is kept
-    /// where hardly an edge was flipped since.
-    fn new(problem: &Problem, last: Option<Self>) -> Result<Self, FlowError> {
-        let connectivity = problem.metric.connectivity();
-        let mut own: Vec<VertexId> = connectivity
-            .vertices()
-            .filter(|&v| problem.prescribed[v] && problem.shares[v] == v)
-            .collect();
-        if problem.scale_free {
-            own.pop();
-        }
-        let mut unknown = VertexVec::filled(NONE, connectivity.vertex_count());
-        for (i, &v) in own.iter().enumerate() {
-            unknown[v] = i as u32;
-        }
-        for v in connectivity.vertices() {
-            unknown[v] = unknown[problem.shares[v]];
-        }
-        let (mut edge, mut pairs) = (Vec::new(), Vec::new());
-        for e in connectivity.edges() {
-            let [i, j] = connectivity.edge_vertices(e).map(|v| unknown[v]);
-            if i != NONE && j != NONE && i != j {
-                edge.push(e);
-                pairs.push([i, j]);
-            }
-        }
-        let flips = problem.metric.flips();
-        let fresh = |last: &Self| {
-            (flips - last.ordered) as f64 <= STALE_SHARE * connectivity.edge_count() as f64
-        };
-        let (solver, ordered) = match last.filter(fresh) {
-            Some(last) => (last.solver.with_pairs(&pairs)?, last.ordered),
-            None => (SymmetricSolver::new(own.len(), &pairs)?, flips),
-        };
-        Ok(Self {
-            solver,
-            unknowns: own.len(),
-            unknown,
-            edge,
-            flips,
-            ordered,
-        })
-    }
-
-    /// The entries for the weights of all edges.
-    fn assemble(&self, problem: &Problem, weight: &EdgeVec<f64>) -> Hessian {
-        let connectivity = problem.metric.connectivity();
-        let mut diagonal = vec![0.0; self.unknowns];
-        let mut row = vec![0.0; self.unknowns];
-        for (e, &w) in weight.enumerate() {
-            let [i, j] = connectivity.edge_vertices(e).map(|v| self.unknown[v]);
-            // An edge within one unknown (a loop, or from a vertex to its mirror image) moves no angle.
-            if i != j {
-                for i in [i, j].into_iter().filter(|&i| i != NONE) {
-                    diagonal[i as usize] += w;
-                    row[i as usize] += 2.0 * w.abs();
-                }
-            }
-        }
-        Hessian {
-            diagonal,
-            off_diagonal: self.edge.iter().map(|&e| -weight[e]).collect(),
-            largest: row.into_iter().fold(f64::MIN_POSITIVE, f64::max),
-        }
-    }
-
-    /// Solves H δ = −residual with `shift` (relative to the largest row) on the diagonal; δ is 0 at vertices that are no
-    /// unknowns. `None` where the matrix is not positive definite.
-    fn direction(
-        &mut self,
-        hessian: &Hessian,
-        shift: f64,
-        residual: &VertexVec<f64>,
-    ) -> Option<VertexVec<f64>> {
-        let shifted = hessian
-            .diagonal
-            .iter()
-            .map(|d| d + shift * hessian.largest)
-            .collect::<Vec<_>>();
-        self.solver
-            .factorize(&shifted, &hessian.off_diagonal)
-            .ok()?;
-        let mut rhs = vec![0.0; self.unknowns];
-        for (v, r) in residual.enumerate() {
-            if self.unknown[v] != NONE {
-                rhs[self.unknown[v] as usize] -= r;
-            }
-        }
-        self.solver.solve(&mut rhs);
-        let at = |&i: &u32| rhs.get(i as usize).copied().unwrap_or(0.0);
-        Some(self.unknown.iter().map(at).collect())
-    }
-}
-
 /// Largest minus smallest value.
 pub(super) fn spread(values: &VertexVec<f64>) -> f64 {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -178,7 +59,7 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
     let mut u = problem.metric.start();
     let (mut now, mut trial) = (Evaluation::default(), Evaluation::default());
     problem.metric.evaluate(&u, &mut now);
-    let mut system = System::new(problem, None)?;
+    let mut system = System::new(&problem.unknowns(), None)?;
     let mut weight = problem.metric.edge_weights(&now);
     let mut residual = problem.residual(&now);
     let mut record = FlowStep {
@@ -213,9 +94,9 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
             return Err(problem.out_of_range(record.iteration, range, &now));
         }
         if system.flips != problem.metric.flips() {
-            system = System::new(problem, Some(system))?;
+            system = System::new(&problem.unknowns(), Some(system))?;
         }
-        let hessian = system.assemble(problem, &weight);
+        let hessian = system.assemble(problem.metric.connectivity(), &weight);
         least = least.min(dot(&residual, &residual).sqrt());
         let taken = if near {
             polished += 1;
@@ -244,7 +125,7 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
                 weight = problem.metric.edge_weights(&now);
                 residual = problem.residual(&now);
                 record.max_error = problem.max_error(&now);
-                system = System::new(problem, None)?;
+                system = System::new(&problem.unknowns(), None)?;
                 polished = 0;
                 continue;
             }
@@ -286,7 +167,7 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
             && record.max_error > 0.5 * last_error
             && spread(&direction) < SYMMETRY_FLOOR;
         if symmetric_floor && problem.separate() {
-            system = System::new(problem, None)?;
+            system = System::new(&problem.unknowns(), None)?;
             polished = 0;
         }
     }

@@ -1,0 +1,422 @@
+//! A choice of places, and what every other place would add to it.
+//!
+//! *Enters:* the linear picture, and what curvature is given. *Leaves:* the cones whose log scale has the least variance that the search
+//! finds.
+//!
+//! With u = u₀ + Σ c_i g_i, where g_v answers a unit of curvature at v, the variance of u over the area is a quadratic function of the
+//! curvatures c. Its matrix is the biharmonic Green's function B(v, w) = ∫ g_v g_w, and one column of B takes two
+//! back-substitutions. The columns of the cones alone tell *for every vertex at once* what the best cones with that vertex would be worth:
+//!
+//! * half the derivative e(v) of the energy by curvature at v, with all else at its best, is a sum of columns;
+//! * its second derivative s(v) is what B(v, v) leaves after projection on the columns (the power function of kriging);
+//! * so the energy falls by e²/s, and no solve is needed to know it.
+//!
+//! Greedy addition of the best vertex is Ben-Chen, Gotsman and Bunin 2008 with the least variance in place of the largest
+//! value; that few cones are enough is what Soliman, Slepčev and Crane 2018 and Fang et al. 2021 show with convex relaxations.
+//! Ours is the exact gain for every vertex and the exchange: each cone in turn is taken away and put where it is worth most, until
+//! none wants to move. B(v, v) is known at vertices far from each other and interpolated between, which costs a little optimality
+//! and no correctness, because a vertex is taken only when its own column says that the energy falls.
+
+use super::picture::Picture;
+use super::quadratic::{Best, Limits, Quadratic};
+use crate::flow::solve::solve_dense;
+use crate::geometry::connectivity::Connectivity;
+use crate::geometry::ids::VertexId;
+use rayon::prelude::*;
+
+/// Share of the energy that an exchange must gain while the search looks for the right part of the surface …
+const COARSE_GAIN: f64 = 1e-2;
+/// … and at the end, for the right vertex: below this places differ by less than an edge.
+const FINE_GAIN: f64 = 1e-4;
+/// Most rounds of adding and taking away.
+const ROUNDS: usize = 3;
+/// Passes of exchanges over all cones.
+const PASSES: usize = 12;
+/// Vertices that are looked at everywhere; from the best of them the search climbs to a vertex that is better than its neighbours.
+const SAMPLES: usize = 2000;
+/// Samples to climb from.
+const SUMMITS: usize = 6;
+/// Samples a thread looks at in one go.
+const PIECE: usize = 256;
+
+/// Cones to be chosen; see the module docs.
+pub(super) struct Placement<'a> {
+    pub(super) picture: &'a mut Picture,
+    connectivity: &'a Connectivity,
+    /// u without cones.
+    pub(super) base: Vec<f64>,
+    /// Where the curvature of a cone comes from, adding up to 1; empty where the boundary is free.
+    pub(super) sink: Vec<f64>,
+    pub(super) limits: Limits,
+    /// Where cones may be.
+    pub(super) allowed: Vec<bool>,
+    /// Variance without cones.
+    base_energy: f64,
+    /// b of every vertex.
+    slope: Vec<f64>,
+    /// Where the search begins.
+    samples: Vec<usize>,
+}
+
+/// A vertex with its column of B.
+#[derive(Clone)]
+pub(super) struct Site {
+    pub(super) vertex: usize,
+    column: Vec<f64>,
+}
+
+/// Chosen places and their best curvatures.
+#[derive(Clone)]
+pub(super) struct Choice {
+    pub(super) sites: Vec<Site>,
+    pub(super) best: Best,
+    /// Variance of the log scale.
+    pub(super) energy: f64,
+}
+
+impl<'a> Placement<'a> {
+    /// `background`: the curvature that there is without cones minus that of the surface, radians; adds up to 0 unless the boundary is
+    /// free.
+    pub(super) fn new(
+        picture: &'a mut Picture,
+        connectivity: &'a Connectivity,
+        background: Vec<f64>,
+        sink: Vec<f64>,
+        limits: Limits,
+        allowed: Vec<bool>,
+    ) -> Self {
+        let mut base = background;
+        picture.solve(&mut base);
+        let mut placement = Self {
+            base_energy: 0.0,
+            slope: Vec::new(),
+            samples: sample(connectivity, &allowed, &base, SAMPLES),
+            base,
+            picture,
+            connectivity,
+            sink,
+            limits,
+            allowed,
+        };
+        placement.slope = placement.base.clone();
+        placement.picture.centre(&mut placement.slope);
+        placement.base_energy = dot(&placement.slope, &placement.base);
+        let mut slope = std::mem::take(&mut placement.slope);
+        placement.dual(&mut slope);
+        placement.slope = slope;
+        placement
+    }
+
+    /// Number of vertices.
+    fn len(&self) -> usize {
+        self.base.len()
+    }
+
+    /// g of some vertices, one after another: the log scale that a unit of curvature causes there.
+    pub(super) fn responses(&mut self, vertices: &[usize]) -> Vec<f64> {
+        let mut fields = Vec::with_capacity(vertices.len() * self.len());
+        for &v in vertices {
+            let from = fields.len();
+            match self.sink.is_empty() {
+                true => fields.resize(from + self.base.len(), 0.0),
+                false => fields.extend(self.sink.iter().map(|x| -x)),
+            }
+            fields[from + v] += 1.0;
+        }
+        self.picture.solve(&mut fields);
+        fields
+    }
+
+    /// Replaces derivatives by log scale, one field after another, by derivatives by curvature.
+    pub(super) fn dual(&mut self, fields: &mut [f64]) {
+        self.picture.solve(fields);
+        if self.sink.is_empty() {
+            return;
+        }
+        for field in fields.chunks_mut(self.sink.len()) {
+            let level = dot(&self.sink, field);
+            field.iter_mut().for_each(|x| *x -= level);
+        }
+    }
+
+    /// Columns of B.
+    pub(super) fn sites(&mut self, vertices: &[usize]) -> Vec<Site> {
+        let mut fields = self.responses(vertices);
+        let n = self.len();
+        for field in fields.chunks_mut(n) {
+            self.picture.centre(field);
+        }
+        self.dual(&mut fields);
+        let columns = fields.chunks(n).map(<[f64]>::to_vec);
+        let sites = vertices.iter().zip(columns);
+        sites
+            .map(|(&vertex, column)| Site { vertex, column })
+            .collect()
+    }
+
+    /// The best curvatures at given places; `None` where the places are too close to each other to tell them apart.
+    pub(super) fn choose(&self, sites: Vec<Site>) -> Option<Choice> {
+        let best = self.program(&sites).minimise(self.limits)?;
+        let energy = self.base_energy + best.energy;
+        energy.is_finite().then_some(Choice {
+            sites,
+            best,
+            energy,
+        })
+    }
+
+    fn program(&self, sites: &[Site]) -> Quadratic {
+        let rows = sites.iter().flat_map(|a| {
+            sites
+                .iter()
+                .map(|b| 0.5 * (a.column[b.vertex] + b.column[a.vertex]))
+        });
+        Quadratic {
+            slope: sites.iter().map(|s| self.slope[s.vertex]).collect(),
+            matrix: rows.collect(),
+        }
+    }
+
+    /// The vertex that is worth most beside `choice`, and the variance that it promises.
+    fn best_addition(&self, choice: &Choice) -> Option<(usize, f64)> {
+        let sites = &choice.sites;
+        let has_total = self.limits.total.is_some();
+        let inside: Vec<usize> = (0..sites.len())
+            .filter(|&i| choice.best.is_inside[i])
+            .collect();
+        let system = self
+            .program(sites)
+            .system(&inside, has_total && !inside.is_empty());
+        let size = inside.len() + usize::from(has_total && !inside.is_empty());
+        let mut inverse = Vec::with_capacity(size * size);
+        for i in 0..size {
+            let mut unit = vec![0.0; size];
+            unit[i] = 1.0;
+            inverse.extend(solve_dense(&system, &unit)?);
+        }
+        let [low, high] = self.limits.for_count(sites.len() + 1).range;
+        let first = sites.is_empty().then_some(self.limits.total).flatten();
+        let taken = |v: usize| !self.allowed[v] || sites.iter().any(|s| s.vertex == v);
+        let gain = |v: usize, row: &mut Vec<f64>| -> f64 {
+            let mut e = self.slope[v] + choice.best.multiplier;
+            for (site, c) in sites.iter().zip(&choice.best.curvature) {
+                e += c * site.column[v];
+            }
+            row.clear();
+            row.extend(inside.iter().map(|&i| sites[i].column[v]));
+            row.resize(size, 1.0);
+            let explained: f64 = (0..size)
+                .map(|i| row[i] * dot(&inverse[i * size..][..size], row))
+                .sum();
+            let own = self.picture.self_energy[v];
+            let s = (own - explained).max(1e-6 * own);
+            let c = first.unwrap_or((-e / s).clamp(low, high));
+            match c == 0.0 {
+                // The first of several that add up to 0: where a positive cone is wanted.
+                true => -e,
+                false => -c * (2.0 * e + c * s),
+            }
+        };
+        let scored: Vec<(usize, f64)> = self
+            .samples
+            .par_iter()
+            .with_min_len(PIECE)
+            .filter(|&&v| !taken(v))
+            .map_init(Vec::new, |row, &v| (v, gain(v, row)))
+            .collect();
+        let mut row = Vec::new();
+        let mut best: Option<(usize, f64)> = None;
+        for (v, value) in summits(&scored) {
+            let mut top = (v, value);
+            loop {
+                let around = self.connectivity.neighbours(VertexId::new(top.0));
+                let next = around
+                    .map(VertexId::index)
+                    .filter(|&w| !taken(w))
+                    .map(|w| (w, gain(w, &mut row)))
+                    .fold(top, |a, b| if b.1 > a.1 { b } else { a });
+                if next.0 == top.0 {
+                    break;
+                }
+                top = next;
+            }
+            if best.is_none_or(|b| top.1 > b.1) {
+                best = Some(top);
+            }
+        }
+        let best = best?;
+        Some((best.0, choice.energy - best.1))
+    }
+
+    /// Adds the best vertex; `None` where nothing can be added.
+    pub(super) fn add(&mut self, choice: &Choice) -> Option<Choice> {
+        let (vertex, _) = self.best_addition(choice)?;
+        let mut sites = choice.sites.clone();
+        sites.extend(self.sites(&[vertex]));
+        self.choose(sites)
+    }
+
+    /// Takes away one cone.
+    pub(super) fn without(&self, choice: &Choice, i: usize) -> Option<Choice> {
+        let mut sites = choice.sites.clone();
+        sites.remove(i);
+        self.choose(sites)
+    }
+
+    /// Moves cones one by one to where they are worth most, until none gains more than `least_gain` of the energy.
+    pub(super) fn exchange(&mut self, mut choice: Choice, least_gain: f64) -> Choice {
+        let count = choice.sites.len();
+        // Cones that stayed where they were since anything moved.
+        let (mut stayed, mut next) = (0, 0);
+        let mut looked = 0;
+        while stayed < count && looked < PASSES * count {
+            looked += 1;
+            let moved = self.without(&choice, next).and_then(|rest| {
+                let (vertex, promised) = self.best_addition(&rest)?;
+                if promised > choice.energy * (1.0 - least_gain) {
+                    return None;
+                }
+                let mut sites = rest.sites;
+                let site = self.sites(&[vertex]);
+                sites.splice(next..next, site);
+                self.choose(sites)
+            });
+            match moved.filter(|moved| moved.energy < choice.energy * (1.0 - least_gain)) {
+                Some(moved) => {
+                    choice = moved;
+                    stayed = 0;
+                }
+                None => stayed += 1,
+            }
+            next = (next + 1) % count;
+        }
+        choice
+    }
+
+    /// `count` cones, or fewer where there are no more places.
+    ///
+    /// Exchange finds a local optimum. So as many cones again are added, the least valuable of all are taken away, and cones are
+    /// exchanged once more, as long as that helps.
+    pub(super) fn search(&mut self, count: usize) -> Option<Choice> {
+        let start = self.choose(Vec::new())?;
+        let start = self.grow(start, count);
+        let mut choice = self.exchange(start, COARSE_GAIN);
+        for _ in 0..ROUNDS {
+            let more = self.grow(choice.clone(), 2 * count.max(2));
+            let Some(fewer) = self.prune(more, count) else {
+                break;
+            };
+            let other = self.exchange(fewer, COARSE_GAIN);
+            let gained = choice.energy - other.energy;
+            let go_on = gained > COARSE_GAIN * choice.energy;
+            if gained > 0.0 {
+                choice = other;
+            }
+            if !go_on {
+                break;
+            }
+        }
+        Some(self.exchange(choice, FINE_GAIN))
+    }
+
+    /// Adds the best vertex again and again.
+    fn grow(&mut self, mut choice: Choice, count: usize) -> Choice {
+        while choice.sites.len() < count {
+            let Some(next) = self.add(&choice) else { break };
+            choice = next;
+        }
+        choice
+    }
+
+    /// Takes away the cones that are worth least, one by one, until `count` are left.
+    pub(super) fn prune(&self, mut choice: Choice, count: usize) -> Option<Choice> {
+        while choice.sites.len() > count {
+            choice = self.cheapest_removal(&choice)?;
+        }
+        Some(choice)
+    }
+
+    /// Without the cone that is worth least.
+    pub(super) fn cheapest_removal(&self, choice: &Choice) -> Option<Choice> {
+        (0..choice.sites.len())
+            .filter_map(|i| self.without(choice, i))
+            .reduce(|a, b| if b.energy < a.energy { b } else { a })
+    }
+
+    /// u of a choice, with mean 0.
+    pub(super) fn log_scale(&mut self, choice: &Choice) -> Vec<f64> {
+        let mut field = vec![0.0; self.len()];
+        for (site, c) in choice.sites.iter().zip(&choice.best.curvature) {
+            field[site.vertex] += c;
+            field
+                .iter_mut()
+                .zip(&self.sink)
+                .for_each(|(x, s)| *x -= c * s);
+        }
+        self.picture.solve(&mut field);
+        field.iter_mut().zip(&self.base).for_each(|(x, b)| *x += b);
+        let mean = self.picture.mean(&field);
+        field.iter_mut().for_each(|x| *x -= mean);
+        field
+    }
+}
+
+/// The few that are worth most.
+fn summits(scored: &[(usize, f64)]) -> Vec<(usize, f64)> {
+    let mut best: Vec<(usize, f64)> = Vec::with_capacity(SUMMITS + 1);
+    for &one in scored {
+        let place = best.partition_point(|b| b.1 >= one.1);
+        if place < SUMMITS {
+            best.insert(place, one);
+            best.truncate(SUMMITS);
+        }
+    }
+    best
+}
+
+/// Vertices spread over the surface, about `count` of them: those of the lowest `order` first, none within some edges of another.
+fn sample(
+    connectivity: &Connectivity,
+    allowed: &[bool],
+    order: &[f64],
+    count: usize,
+) -> Vec<usize> {
+    let mut vertices: Vec<usize> = (0..order.len()).filter(|&v| allowed[v]).collect();
+    if vertices.len() <= 2 * count {
+        return vertices;
+    }
+    vertices.sort_by(|&v, &w| order[v].total_cmp(&order[w]).then(v.cmp(&w)));
+    let radius = ((vertices.len() / count) as f64).sqrt().round().max(1.0) as usize;
+    let mut is_near = vec![false; order.len()];
+    let mut samples = Vec::new();
+    for v in vertices {
+        if is_near[v] {
+            continue;
+        }
+        samples.push(v);
+        is_near[v] = true;
+        let (mut ring, mut within) = (vec![v], vec![v]);
+        for _ in 0..radius {
+            let mut next = Vec::new();
+            for &x in &ring {
+                for w in connectivity
+                    .neighbours(VertexId::new(x))
+                    .map(VertexId::index)
+                {
+                    if !within.contains(&w) {
+                        within.push(w);
+                        next.push(w);
+                        is_near[w] = true;
+                    }
+                }
+            }
+            ring = next;
+        }
+    }
+    samples
+}
+
+/// Σ a b in a fixed order.
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
