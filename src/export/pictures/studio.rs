@@ -65,18 +65,17 @@ pub(super) struct Props {
 impl<'a> Studio<'a> {
     /// Chooses the view and lights the scene for a picture of `size` × `size` pixels, held to the range of sizes.
     pub fn new(mesh: &'a Mesh, size: usize) -> Studio<'a> {
+        Self::seen_from(mesh, size, direction(mesh))
+    }
+
+    /// The same from a direction, a unit vector from the scene to the eye.
+    pub fn seen_from(mesh: &'a Mesh, size: usize, direction: Vec3) -> Studio<'a> {
         let size = super::side(size);
         let connectivity = &mesh.connectivity;
         let positions = mesh.positions.as_slice();
         let faces = connectivity.to_faces();
         let vertex_normals = vertex_normals(positions, &faces);
-        let stand_in = |(least, cells): (usize, u32)| -> Option<Coarse> {
-            (faces.len() > least).then(|| coarse(positions, &vertex_normals, &faces, cells))
-        };
-        let direction = match stand_in(VIEWED) {
-            Some(few) => choose_direction(&few.positions, &few.faces),
-            None => choose_direction(positions, &faces),
-        };
+        let few = stand_in(LIT, positions, &vertex_normals, &faces);
         let side = size * SAMPLES;
         let camera = Camera::looking_from(direction, positions, side as f64);
         let oriented = |r: f64, u: f64, b: f64| {
@@ -87,7 +86,7 @@ impl<'a> Studio<'a> {
         };
         let (lamp, fill) = (oriented(-0.55, 0.75, 0.55), oriented(0.8, 0.15, 0.5));
         let up = [0.0, 1.0, 0.0];
-        let lights = match stand_in(LIT) {
+        let lights = match few {
             Some(few) => Lights::new(&few.positions, &few.faces, lamp, up),
             None => Lights::new(positions, &faces, lamp, up),
         };
@@ -227,6 +226,31 @@ impl<'a> Studio<'a> {
             }
         }
     }
+}
+
+/// A direction that shows much of the surface, a unit vector from the scene to the eye.
+pub(super) fn direction(mesh: &Mesh) -> Vec3 {
+    let positions = mesh.positions.as_slice();
+    let faces = mesh.connectivity.to_faces();
+    match stand_in(
+        VIEWED,
+        positions,
+        &vertex_normals(positions, &faces),
+        &faces,
+    ) {
+        Some(few) => choose_direction(&few.positions, &few.faces),
+        None => choose_direction(positions, &faces),
+    }
+}
+
+/// A coarser surface where there are more than so many faces.
+fn stand_in(
+    (least, cells): (usize, u32),
+    positions: &[Vec3],
+    normals: &[Vec3],
+    faces: &[[u32; 3]],
+) -> Option<Coarse> {
+    (faces.len() > least).then(|| coarse(positions, normals, faces, cells))
 }
 
 /// Unit normals of the vertices, weighted by area.

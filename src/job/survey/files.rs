@@ -269,7 +269,8 @@ fn draw(
         })?;
         staging.write(&path, &bytes)
     };
-    let gallery = Gallery::new(&surface.mesh, size);
+    // Two panels, each from two sides, in about as many pixels as two of the full size.
+    let gallery = Gallery::new(&surface.mesh, size * 3 / 4);
     for &(row, figures) in &built {
         let before = component.before(row.asked);
         let before = before.and_then(|row| Some((row, row.result.as_ref().ok()?)));
