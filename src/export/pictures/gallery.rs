@@ -67,6 +67,16 @@ impl<'a> Gallery<'a> {
     /// geometric mean, so that the one need not be all pale nor the other all dark. Cones are red or blue by their
     /// sign, larger for more curvature.
     pub fn row(&self, panels: &[Panel<'_>]) -> RgbImage {
+        self.shrunk(panels, 1)
+    }
+
+    /// The same in panels of half the size, for many of them.
+    pub fn overview(&self, panels: &[Panel<'_>]) -> RgbImage {
+        self.shrunk(panels, 2)
+    }
+
+    /// Panels by a whole number smaller than they are drawn.
+    fn shrunk(&self, panels: &[Panel<'_>], by: usize) -> RgbImage {
         let mesh = self.mesh;
         let ranges: Vec<Range> = (panels.iter())
             .map(|panel| Range::of(mesh, panel.log_scale))
@@ -75,7 +85,7 @@ impl<'a> Gallery<'a> {
         let least = reaches.clone().fold(f64::INFINITY, f64::min);
         let greatest = reaches.fold(0.0, f64::max);
         let reach = (least * greatest).sqrt();
-        let side = self.side;
+        let side = self.side / by;
         let lines = panels.iter().map(|p| p.title.len()).max().unwrap_or(0);
         let head = lines * LINE + 2 * MARGIN;
         // The bar of colours has a place of its own, beside panels that have room for it.
@@ -91,6 +101,13 @@ impl<'a> Gallery<'a> {
             for (row, studio) in self.studios.iter().enumerate() {
                 let props = studio.place(marks(studio, panel));
                 let drawn = studio.draw(&props, &Paint::Smooth(&paint));
+                let drawn = match by {
+                    1 => drawn,
+                    _ => {
+                        let side = side as u32;
+                        imageops::resize(&drawn, side, side, imageops::FilterType::Triangle)
+                    }
+                };
                 let top = head + row * side;
                 imageops::replace(&mut image, &drawn, left as i64, top as i64);
             }

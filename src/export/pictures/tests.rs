@@ -302,6 +302,9 @@ fn a_gallery_shows_panels_alike_and_side_by_side() {
     };
     let [alone, beside, wide] = [colour(&single, 0), colour(&mixed, 0), colour(&mixed, 128)];
     assert!(beside < alone && alone < wide, "{beside} {alone} {wide}");
+    // Smaller panels of the same.
+    let small = gallery.overview(&[panel(&one), panel(&two)]);
+    assert_eq!(small.dimensions().0, 128);
     // What has no number is drawn without a colour, and nothing breaks.
     gallery.row(&[panel(&one), panel(&none), panel(&[])]);
     gallery.row(&[]);

@@ -289,8 +289,7 @@ fn draw(
         .map(|(row, figures)| panel(survey, row, figures))
         .collect();
     panels.extend((built.iter()).map(|&(row, figures)| panel(survey, row, figures)));
-    let small = Gallery::new(&surface.mesh, size / 2);
-    save("cones", small.row(&panels))
+    save("cones", gallery.overview(&panels))
 }
 
 fn panel<'a>(survey: &Survey, row: &Row, figures: &'a Figures) -> Panel<'a> {

@@ -64,6 +64,19 @@ impl fmt::Display for Survey {
                 }
             )?;
             f.write_str(&table(component, surface.area.sqrt()))?;
+            for row in component.chosen() {
+                if row
+                    .result
+                    .as_ref()
+                    .is_ok_and(|figures| figures.list.is_none())
+                {
+                    writeln!(
+                        f,
+                        "  note: no list is written for {}: a cone lies where repair split or made a vertex, which has no number of its own in the file",
+                        row.name()
+                    )?;
+                }
+            }
             if let Some(suggestion) = &component.suggestion {
                 let count = suggestion.count;
                 writeln!(f, "  suggested: {count}, for {}", suggestion.reason)?;
