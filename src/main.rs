@@ -15,7 +15,7 @@ use affine_atlas::observe::Observer;
 use affine_atlas::outcome::{AssetOutcome, Failure, FailureKind};
 use affine_atlas::read::{self, ReadParams};
 use affine_atlas::verify::{self, SourceSurface, VerifyOptions};
-use cli::work::{Inspection, Surveyed, VerifyRequest, VerifyResult, Work};
+use cli::work::{Inspection, SurveyRequest, Surveyed, VerifyRequest, VerifyResult, Work};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -57,16 +57,23 @@ fn inspect(asset: &Asset, config: &Config) -> Result<Inspection, Failure> {
     })
 }
 
-fn survey(
-    asset: &Asset,
-    output: &Path,
-    config: &Config,
-    counts: Option<&[usize]>,
-    observer: &dyn Observer,
-) -> Surveyed {
-    let (path, given) = (&asset.path, asset.given.to_string_lossy());
-    let (survey, outcome) =
-        job::survey::run(path, &given, output, &asset.id, config, counts, observer);
+fn survey(request: &SurveyRequest<'_>, observer: &dyn Observer) -> Surveyed {
+    let SurveyRequest {
+        asset,
+        output,
+        config,
+        counts,
+    } = *request;
+    let given = asset.given.to_string_lossy();
+    let (survey, outcome) = job::survey::run(
+        &asset.path,
+        &given,
+        output,
+        &asset.id,
+        config,
+        counts,
+        observer,
+    );
     Surveyed {
         text: survey.as_ref().map(ToString::to_string).unwrap_or_default(),
         json: survey.as_ref().map(|survey| survey.json(true)),

@@ -129,11 +129,11 @@ mod tests {
                 message: String::new(),
             })
         },
-        survey: |asset, _, _, _, _| Surveyed {
+        survey: |request, _| Surveyed {
             text: String::new(),
             json: None,
             suggested: None,
-            outcome: built(&asset.id),
+            outcome: built(&request.asset.id),
         },
         survey_folder: str::to_owned,
         verify: |_| {

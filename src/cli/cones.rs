@@ -5,7 +5,7 @@ use super::build::exit_code;
 use super::plan::{Plan, plan, start_threads};
 use super::problem::Problem;
 use super::progress::Progress;
-use super::work::{Surveyed, Work};
+use super::work::{SurveyRequest, Surveyed, Work};
 use super::{interrupt, panics, summary, terminal};
 use affine_atlas::config::assets::Asset;
 use affine_atlas::observe::Observer;
@@ -67,7 +67,13 @@ fn survey_one(
     if observer.cancelled() {
         return without_table(AssetOutcome::whole(&asset.id, AssetState::Cancelled, 0.0));
     }
-    let survey = || (work.survey)(asset, &plan.output, &plan.config, counts, observer);
+    let request = SurveyRequest {
+        asset,
+        output: &plan.output,
+        config: &plan.config,
+        counts,
+    };
+    let survey = || (work.survey)(&request, observer);
     panics::catch(survey).unwrap_or_else(|panic| {
         let failure = Failure {
             kind: FailureKind::Internal,

@@ -15,8 +15,8 @@ pub struct Work {
     /// Says what a build would do, without building.
     pub inspect: fn(&Asset, &Config) -> Result<Inspection, Failure>,
     /// Flattens one asset with different numbers of cones and writes what came of it into a folder below the output folder
-    /// given; the numbers are those of the arguments, if any.
-    pub survey: fn(&Asset, &Path, &Config, Option<&[usize]>, &dyn Observer) -> Surveyed,
+    /// given.
+    pub survey: fn(&SurveyRequest<'_>, &dyn Observer) -> Surveyed,
     /// Name of that folder for an asset's id.
     pub survey_folder: fn(&str) -> String,
     /// Reads an output folder back and checks it.
@@ -31,6 +31,18 @@ pub struct Inspection {
     pub text: String,
     /// Whether a build would be refused for what is known already.
     pub refused: bool,
+}
+
+/// What `cones` is asked for one asset.
+pub struct SurveyRequest<'a> {
+    /// The asset.
+    pub asset: &'a Asset,
+    /// The output folder.
+    pub output: &'a Path,
+    /// The effective configuration.
+    pub config: &'a Config,
+    /// Numbers of cones, where the arguments name them.
+    pub counts: Option<&'a [usize]>,
 }
 
 /// What `cones` says of one asset.

@@ -207,7 +207,7 @@ impl<'a> Studio<'a> {
                 shade[v] = of;
             }
         }
-        let floor: Vec<(Vec3, Vec3)> = self.floor.points().into_iter().collect();
+        let floor: Vec<(Vec3, Vec3)> = self.floor.points().collect();
         self.floor.shade = self.lights.shade(&floor);
     }
 

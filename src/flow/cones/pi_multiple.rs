@@ -203,8 +203,10 @@ mod tests {
 
     #[test]
     fn radians_keep_every_bit() {
-        // No double times π rounds to the first of these.
-        for x in [3.141592653589794, 1.5707963267948966, -0.1, 1e-300, -7.25] {
+        // No double times π rounds to the double after π: multiples pass it by.
+        let passed_by = PI.next_up();
+        assert!(1.0 * PI < passed_by && 1.0_f64.next_up() * PI > passed_by);
+        for x in [passed_by, PI / 2.0, -0.1, 1e-300, -7.25] {
             let holder: Holder = toml::from_str(&format!("k = \"{x} rad\"")).unwrap();
             assert_eq!(holder.k.radians(), x);
             assert!((holder.k.multiple() * PI - x).abs() <= 1e-15 * x.abs());

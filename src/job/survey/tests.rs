@@ -113,7 +113,7 @@ fn figures_are_those_of_a_build_with_the_list() {
         let config = Config::default();
         let surveyed = survey(&soup, &config, Some(&[8]), &()).expect("surveyed");
         for row in &surveyed[0].rows {
-            let figures = row.result.as_ref().expect(&row.name());
+            let figures = row.result.as_ref().expect("flattened");
             let mut config = config.clone();
             config.cones.list = figures.list.clone().expect("every vertex has a number");
             config.cones.strategy = match figures.cones.is_empty() {
