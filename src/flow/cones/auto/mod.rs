@@ -1,14 +1,18 @@
 //! Cones chosen by the program (tutorial 5.2, Problem 21).
 
+mod area;
+mod moves;
 mod picture;
 mod placement;
 mod quadratic;
+mod quantum;
 
 use super::{
-    BoundaryCondition, BoundaryParams, ConeError, ConeParams, RequestedCone, Requests, boundary,
+    BoundaryCondition, BoundaryParams, ConeError, ConeObjective, ConeParams, RequestedCone,
+    Requests, boundary,
 };
 use crate::geometry::connectivity::Topology;
-use crate::geometry::ids::VertexVec;
+use crate::geometry::ids::{VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
 use picture::Picture;
 use placement::Placement;
@@ -26,6 +30,7 @@ pub(super) fn select(
 ) -> Result<Vec<RequestedCone>, ConeError> {
     let given = given(mesh, topology, requests, condition, boundary)?;
     let is_free = topology.boundary_loops > 0 && condition == BoundaryCondition::Free;
+    let t = std::time::Instant::now();
     let mut picture = Picture::new(mesh, is_free).map_err(|e| ConeError::NotChosen {
         reason: e.to_string(),
     })?;
@@ -59,20 +64,31 @@ pub(super) fn select(
         .ok_or_else(|| ConeError::NotChosen {
             reason: "the places for cones cannot be told apart".into(),
         })?;
-    let cone = |(site, &curvature): (&placement::Site, &f64)| {
-        let vertex = crate::geometry::ids::VertexId::new(site.vertex);
+    let (mut vertices, mut curvature): (Vec<usize>, Vec<f64>) = (
+        choice.sites.iter().map(|s| s.vertex).collect(),
+        choice.best.curvature.clone(),
+    );
+    if cones.objective == ConeObjective::AreaDistortion || std::env::var("AREA").is_ok() {
+        let done = moves::lower_distortion(
+            &mut placement,
+            mesh,
+            &vertices,
+            &curvature,
+            moves::Rule::Best(limits),
+        );
+        vertices = done.places.iter().map(|p| p.vertex).collect();
+        curvature = done.curvature;
+        eprintln!("area {:?} F {}", t.elapsed(), done.value.exp() - 1.0);
+    }
+    let cone = |(&v, &curvature): (&usize, &f64)| {
+        let vertex = VertexId::new(v);
         RequestedCone {
             vertex,
             named: mesh.source_vertex[vertex],
             curvature,
         }
     };
-    Ok(choice
-        .sites
-        .iter()
-        .zip(&choice.best.curvature)
-        .map(cone)
-        .collect())
+    Ok(vertices.iter().zip(&curvature).map(cone).collect())
 }
 
 /// What there is without cones.

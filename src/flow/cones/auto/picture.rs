@@ -189,6 +189,12 @@ fn self_energies(
         .collect())
 }
 
+/// Area of the surface, squared source units.
+pub(super) fn total_area(mesh: &Mesh) -> f64 {
+    let faces = mesh.connectivity.faces();
+    faces.map(|f| triangle_area(mesh.face_positions(f))).sum()
+}
+
 /// A third of the area of the faces at each vertex, all together 1.
 fn vertex_areas(mesh: &Mesh) -> Vec<f64> {
     let c = &mesh.connectivity;

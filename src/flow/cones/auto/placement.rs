@@ -55,7 +55,7 @@ pub(super) struct Placement<'a> {
     /// b of every vertex.
     slope: Vec<f64>,
     /// Where the search begins.
-    samples: Vec<usize>,
+    pub(super) samples: Vec<usize>,
 }
 
 /// A vertex with its column of B.
@@ -198,10 +198,7 @@ impl<'a> Placement<'a> {
         let first = sites.is_empty().then_some(self.limits.total).flatten();
         let taken = |v: usize| !self.allowed[v] || sites.iter().any(|s| s.vertex == v);
         let gain = |v: usize, row: &mut Vec<f64>| -> f64 {
-            let mut e = self.slope[v] + choice.best.multiplier;
-            for (site, c) in sites.iter().zip(&choice.best.curvature) {
-                e += c * site.column[v];
-            }
+            let e = choice.best.multiplier + self.derivative(v, sites, &choice.best.curvature);
             row.clear();
             row.extend(inside.iter().map(|&i| sites[i].column[v]));
             row.resize(size, 1.0);
@@ -217,23 +214,32 @@ impl<'a> Placement<'a> {
                 false => -c * (2.0 * e + c * s),
             }
         };
+        let best = self.climb(taken, gain)?;
+        Some((best.0, choice.energy - best.1))
+    }
+
+    /// The vertex worth most: the best of the samples, and from there uphill. `worth` gets a buffer of its own.
+    pub(super) fn climb(
+        &self,
+        taken: impl Fn(usize) -> bool + Sync,
+        worth: impl Fn(usize, &mut Vec<f64>) -> f64 + Sync,
+    ) -> Option<(usize, f64)> {
         let scored: Vec<(usize, f64)> = self
             .samples
             .par_iter()
             .with_min_len(PIECE)
             .filter(|&&v| !taken(v))
-            .map_init(Vec::new, |row, &v| (v, gain(v, row)))
+            .map_init(Vec::new, |row, &v| (v, worth(v, row)))
             .collect();
         let mut row = Vec::new();
         let mut best: Option<(usize, f64)> = None;
-        for (v, value) in summits(&scored) {
-            let mut top = (v, value);
+        for mut top in summits(&scored) {
             loop {
                 let around = self.connectivity.neighbours(VertexId::new(top.0));
                 let next = around
                     .map(VertexId::index)
                     .filter(|&w| !taken(w))
-                    .map(|w| (w, gain(w, &mut row)))
+                    .map(|w| (w, worth(w, &mut row)))
                     .fold(top, |a, b| if b.1 > a.1 { b } else { a });
                 if next.0 == top.0 {
                     break;
@@ -244,8 +250,18 @@ impl<'a> Placement<'a> {
                 best = Some(top);
             }
         }
-        let best = best?;
-        Some((best.0, choice.energy - best.1))
+        best
+    }
+
+    /// Half the derivative of the energy by curvature at `v`, with these cones.
+    pub(super) fn derivative(&self, v: usize, sites: &[Site], curvature: &[f64]) -> f64 {
+        let cones = sites.iter().zip(curvature);
+        self.slope[v] + cones.map(|(site, c)| c * site.column[v]).sum::<f64>()
+    }
+
+    /// Variance of the log scale with these cones.
+    pub(super) fn energy(&self, sites: &[Site], curvature: &[f64]) -> f64 {
+        self.base_energy + self.program(sites).energy(curvature)
     }
 
     /// Adds the best vertex; `None` where nothing can be added.

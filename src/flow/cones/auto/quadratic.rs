@@ -30,6 +30,27 @@ impl Limits {
         };
         Self { range, ..self }
     }
+
+    /// Curvatures within the limits, near those given.
+    pub(super) fn nearest(self, curvature: &[f64]) -> Vec<f64> {
+        let [low, high] = self.range;
+        let mut c: Vec<f64> = curvature.iter().map(|x| x.clamp(low, high)).collect();
+        if let Some(total) = self.total {
+            // Each pass shares what is missing among those that are not at the limit in its way.
+            for _ in 0..=c.len() {
+                let missing = total - c.iter().sum::<f64>();
+                let open = |x: f64| if missing > 0.0 { x < high } else { x > low };
+                let count = c.iter().filter(|x| open(**x)).count();
+                if missing == 0.0 || count == 0 {
+                    break;
+                }
+                for x in c.iter_mut().filter(|x| open(**x)) {
+                    *x = (*x + missing / count as f64).clamp(low, high);
+                }
+            }
+        }
+        c
+    }
 }
 
 /// A quadratic program; see the module docs.
@@ -98,10 +119,21 @@ impl Quadratic {
 
     /// The least energy within the limits; `None` where the equations are singular.
     pub(super) fn minimise(&self, limits: Limits) -> Option<Best> {
-        let count = self.len();
-        let limits = limits.for_count(count);
+        let limits = limits.for_count(self.len());
+        self.within(&vec![limits.range; self.len()], limits.total)
+    }
+
+    /// The change from `start`, which is within the limits, that makes the energy of the *change* least; `limits.total` is that of the
+    /// change.
+    pub(super) fn minimise_from(&self, start: &[f64], limits: Limits) -> Option<Best> {
         let [low, high] = limits.range;
-        let has_total = limits.total.is_some() && count > 0;
+        let ranges: Vec<[f64; 2]> = start.iter().map(|c| [low - c, high - c]).collect();
+        self.within(&ranges, limits.total)
+    }
+
+    fn within(&self, ranges: &[[f64; 2]], total: Option<f64>) -> Option<Best> {
+        let count = self.len();
+        let has_total = total.is_some() && count > 0;
         let mut c = vec![0.0; count];
         let mut is_inside = vec![true; count];
         let mut multiplier = 0.0;
@@ -117,7 +149,7 @@ impl Quadratic {
             let mut rhs: Vec<f64> = inside.iter().map(|&i| -self.slope[i] - fixed(i)).collect();
             if has_total && !inside.is_empty() {
                 let rest: f64 = (0..count).filter(|&j| !is_inside[j]).map(|j| c[j]).sum();
-                rhs.push(limits.total.unwrap_or(0.0) - rest);
+                rhs.push(total.unwrap_or(0.0) - rest);
             }
             if !rhs.is_empty() {
                 let solution = solve_dense(&self.system(&inside, has_total), &rhs)?;
@@ -130,19 +162,19 @@ impl Quadratic {
                     0.0
                 };
             }
-            let excess = |i: usize| (c[i] - high).max(low - c[i]);
+            let excess = |i: usize| (c[i] - ranges[i][1]).max(ranges[i][0] - c[i]);
             let worst = inside
                 .into_iter()
                 .max_by(|&i, &j| excess(i).total_cmp(&excess(j)));
             if let Some(i) = worst.filter(|&i| excess(i) > 1e-12) {
-                c[i] = c[i].clamp(low, high);
+                c[i] = c[i].clamp(ranges[i][0], ranges[i][1]);
                 is_inside[i] = false;
                 continue;
             }
             // By how much a fixed curvature would like to come back inside.
             let wish = |i: usize| {
                 let slope = self.derivative(&c, i) + multiplier;
-                if c[i] == high { slope } else { -slope }
+                if c[i] == ranges[i][1] { slope } else { -slope }
             };
             let outside = (0..count).filter(|&i| !is_inside[i]);
             let keenest = outside.max_by(|&i, &j| wish(i).total_cmp(&wish(j)));
@@ -151,11 +183,14 @@ impl Quadratic {
                 None => break,
             }
         }
-        if let Some(total) = limits.total {
+        for (x, [low, high]) in c.iter_mut().zip(ranges) {
+            *x = x.clamp(*low, *high);
+        }
+        if let Some(total) = total {
             // Only rounding, unless the passes ran out.
             for i in 0..count {
                 let missing = total - c.iter().sum::<f64>();
-                c[i] = (c[i] + missing).clamp(low, high);
+                c[i] = (c[i] + missing).clamp(ranges[i][0], ranges[i][1]);
             }
         }
         Some(Best {
@@ -164,5 +199,90 @@ impl Quadratic {
             multiplier,
             is_inside,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::ricci::shapes::sequence;
+
+    /// Σ over a few random directions that keep the total: none leads down within the limits.
+    fn is_least(
+        program: &Quadratic,
+        best: &Best,
+        limits: Limits,
+        random: &mut impl FnMut() -> f64,
+    ) -> bool {
+        let [low, high] = limits.range;
+        (0..200).all(|_| {
+            let mut d: Vec<f64> = (0..program.len()).map(|_| random() - 0.5).collect();
+            if limits.total.is_some() {
+                let mean = d.iter().sum::<f64>() / d.len() as f64;
+                d.iter_mut().for_each(|x| *x -= mean);
+            }
+            let moved: Vec<f64> = best
+                .curvature
+                .iter()
+                .zip(&d)
+                .map(|(c, d)| c + 1e-3 * d)
+                .collect();
+            let inside = moved.iter().all(|x| (low..=high).contains(x));
+            !inside || program.energy(&moved) >= best.energy - 1e-12
+        })
+    }
+
+    #[test]
+    fn the_best_curvatures_keep_limits_and_total_and_are_best() {
+        let mut random = sequence(5);
+        for round in 0..400 {
+            let k = 1 + round % 9;
+            let convex = round % 3 != 0;
+            // B = M Mᵀ, or just symmetric.
+            let m: Vec<f64> = (0..k * k).map(|_| random() - 0.5).collect();
+            let matrix = (0..k * k).map(|x| {
+                let (i, j) = (x / k, x % k);
+                match convex {
+                    true => {
+                        (0..k).map(|l| m[i * k + l] * m[j * k + l]).sum::<f64>()
+                            + if i == j { 0.01 } else { 0.0 }
+                    }
+                    false => m[i * k + j] + m[j * k + i],
+                }
+            });
+            let program = Quadratic {
+                matrix: matrix.collect(),
+                slope: (0..k).map(|_| 4.0 * random() - 2.0).collect(),
+            };
+            let range = [-0.5 - random(), 0.5 + random()];
+            let total = (round % 2 == 0).then(|| (random() - 0.5) * k as f64);
+            let limits = Limits { range, total };
+            let best = program.minimise(limits).unwrap();
+            let wide = limits.for_count(k);
+            for c in &best.curvature {
+                assert!(
+                    *c >= wide.range[0] - 1e-12 && *c <= wide.range[1] + 1e-12,
+                    "{round}: {best:?}"
+                );
+            }
+            if let Some(total) = total {
+                let sum: f64 = best.curvature.iter().sum();
+                assert!((sum - total).abs() < 1e-9, "{round}: {sum} {total}");
+            }
+            assert!((program.energy(&best.curvature) - best.energy).abs() < 1e-9);
+            if convex {
+                assert!(is_least(&program, &best, wide, &mut random), "{round}");
+            }
+            let start = limits.for_count(k).nearest(&vec![0.3; k]);
+            let change = Limits {
+                range: wide.range,
+                total: total.map(|_| 0.0),
+            };
+            let step = program.minimise_from(&start, change).unwrap();
+            if total.is_some() {
+                let sum: f64 = step.curvature.iter().sum();
+                assert!(sum.abs() < 1e-9, "{round}: {sum} {step:?} {start:?}");
+            }
+        }
     }
 }
