@@ -1,6 +1,6 @@
 //! What a build would do with an asset, without building it.
 
-use super::{BuildError, refine_for};
+use super::{BuildError, listing, refine_for};
 use crate::config::Config;
 use crate::flow::cones::{self, BoundaryCondition, Prescription, in_pi};
 use crate::geometry::mesh::Mesh;
@@ -124,53 +124,12 @@ fn describe(
     } else {
         format!("  Gauss–Bonnet: {required} required, {given} prescribed")
     });
-    if prescription.cones.is_empty() {
-        line("  cones: none".to_owned());
-    }
-    for (inside, curvature, vertices) in by_curvature(mesh, prescription) {
-        let count = match inside {
-            true => counted(vertices.len(), "cone", "cones"),
-            false => counted(vertices.len(), "boundary vertex", "boundary vertices"),
-        };
-        let curvature = in_pi(curvature);
-        line(format!("  {count} of {curvature}: {}", listed(&vertices)));
-    }
-}
-
-/// Vertices of the file that get the same curvature, inside or on the boundary; in the order of the first of each.
-fn by_curvature(mesh: &Mesh, prescription: &Prescription) -> Vec<(bool, f64, Vec<u32>)> {
-    let mut groups: Vec<(bool, f64, Vec<u32>)> = Vec::new();
-    for cone in &prescription.cones {
-        let vertex = mesh.source_vertex[cone.vertex];
-        let inside = !mesh.connectivity.is_boundary_vertex(cone.vertex);
-        let same = |g: &&mut (bool, f64, _)| g.0 == inside && g.1 == cone.curvature;
-        match groups.iter_mut().find(same) {
-            Some((_, _, vertices)) => vertices.push(vertex),
-            None => groups.push((inside, cone.curvature, vec![vertex])),
-        }
-    }
-    groups
-}
-
-/// At most so many vertices stand in one line.
-const LISTED: usize = 12;
-
-/// `at vertices 3, 7 and 9 of the file`.
-fn listed(vertices: &[u32]) -> String {
-    let names: Vec<String> = vertices.iter().map(u32::to_string).collect();
-    match &names[..] {
-        [only] => format!("at vertex {only} of the file"),
-        many if many.len() > LISTED => format!(
-            "at vertices {} … of the file, {} more",
-            many[..LISTED].join(", "),
-            many.len() - LISTED
-        ),
-        [first @ .., last] => format!("at vertices {} and {last} of the file", first.join(", ")),
-        [] => String::new(),
+    for words in listing::cones(mesh, prescription) {
+        line(format!("  {words}"));
     }
 }
 
 /// A count with its noun.
-fn counted(count: usize, one: &str, several: &str) -> String {
+pub(super) fn counted(count: usize, one: &str, several: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { several })
 }

@@ -10,3 +10,4 @@ mod interrupt;
 mod prescriptions;
 mod refusals;
 mod replacing;
+mod survey;

@@ -60,6 +60,15 @@ pub enum ConeError {
         "cones.strategy is \"listed\", but cones.list is empty: add cones or choose another strategy"
     )]
     EmptyList,
+    /// A file of cones that nobody read.
+    #[error(
+        "cones.file names {}, but it was not read: load the configuration with config::load, or fill cones.list and cones.file_lines with cones::file::parse",
+        path.display()
+    )]
+    FileNotRead {
+        /// As written.
+        path: std::path::PathBuf,
+    },
     /// `prescribed` without a list.
     #[error(
         "boundary.condition is \"prescribed\", but boundary.list is empty: add boundary vertices or set the condition to \"uniform\""
