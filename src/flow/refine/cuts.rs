@@ -6,7 +6,7 @@
 //! For flat disks and Φ ≡ 0 a margin of 1.5 asks for a link of 3, which every disk has, so nothing far from the cones is touched.
 
 use super::{Editor, MARGIN, OutOfSplits};
-use crate::flow::feasibility::{Constraint, ROOM, Region};
+use crate::flow::feasibility::{Constraint, Region};
 use crate::geometry::ids::{EdgeVec, HalfedgeId};
 
 /// Splits edges around offending sets until no set lacks edges for tangent circles.
@@ -27,6 +27,12 @@ pub(super) struct Shortage {
     region: Region,
     /// Halfedges of the link, each with the room of the corner opposite, radians.
     link: Vec<(HalfedgeId, f64)>,
+}
+
+impl Shortage {
+    pub fn report(&self) -> (usize, f64, f64) {
+        (self.region.vertices.len(), self.region.slack, self.link.iter().map(|l| l.1).sum())
+    }
 }
 
 /// The regions that break (6) with a margin. `phi` as for [`Constraint::new`].
@@ -53,8 +59,9 @@ pub(super) fn shortages(editor: &Editor, phi: Option<&EdgeVec<f64>>, margin: f64
 /// Splits edges of the link, long ones first, until their worth makes up for what the region lacks; one at least.
 pub(super) fn fill(editor: &mut Editor, shortage: &Shortage) -> Result<(), OutOfSplits> {
     let mut link = shortage.link.clone();
-    let mut lacking = ROOM - shortage.region.slack;
-    while lacking > 0.0 {
+    // Equality is not enough: one edge at least.
+    let mut lacking = -shortage.region.slack;
+    while lacking >= 0.0 {
         let longest = link
             .iter()
             .max_by(|(g, _), (h, _)| editor.by_length(*g, *h));

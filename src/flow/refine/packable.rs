@@ -45,6 +45,10 @@ pub fn make_packable(
             phi = Some(packing.intersection_angles());
         }
         let shortages = shortages(&editor, phi.as_ref(), MARGIN);
+        if std::env::var_os("FEAS_DEBUG").is_some() {
+            let sizes: Vec<(usize, f64, f64)> = shortages.iter().map(|s| s.report()).collect();
+            eprintln!("{} vertices, {} regions {:?}", editor.target.len(), shortages.len(), &sizes[..sizes.len().min(12)]);
+        }
         if shortages.is_empty() {
             break;
         }
