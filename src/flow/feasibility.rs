@@ -82,52 +82,49 @@ pub struct Violation {
 /// Most vertices of a region that a message lists.
 const LISTED: usize = 8;
 
-impl fmt::Display for Violation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl Violation {
+    /// What is wrong, without what to do about it.
+    pub fn statement(&self) -> String {
         let vertex = self.vertex;
-        match self.size {
-            0 | 1 => write!(f, "no circle packing exists: vertex {vertex}")?,
+        let set = match self.size {
+            0 | 1 => format!("vertex {vertex}"),
             size => {
                 let listed: Vec<String> = (self.vertices.iter().take(LISTED))
                     .map(VertexId::to_string)
                     .collect();
-                let more = match self.vertices.len() > LISTED {
-                    true => ", …",
-                    false => "",
+                let more = if self.vertices.len() > LISTED {
+                    ", …"
+                } else {
+                    ""
                 };
-                write!(
-                    f,
-                    "no circle packing exists: the region of {size} vertices around vertex {vertex} ({}{more})",
-                    listed.join(", ")
-                )?;
+                let listed = listed.join(", ");
+                format!("the region of {size} vertices around vertex {vertex} ({listed}{more})")
             }
-        }
-        let relation = match self.side {
-            Side::Below => "more",
-            Side::Above => "less",
+        };
+        let (relation, too) = match self.side {
+            Side::Below => ("more", "little"),
+            Side::Above => ("less", "much"),
         };
         let (bound, given) = (in_pi(self.bound), in_pi(self.curvature));
+        let prescribed = match self.slack == 0.0 {
+            true => "exactly that is prescribed".to_owned(),
+            false if bound == given => {
+                format!("{given} is prescribed, {:.1e}π too {too}", -self.slack / PI)
+            }
+            false => format!("{given} is prescribed"),
+        };
+        format!(
+            "no circle packing exists: {set} must have {relation} than {bound} of curvature by (6), but {prescribed}"
+        )
+    }
+}
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            " must have {relation} than {bound} of curvature by (6), but "
-        )?;
-        match self.slack == 0.0 {
-            true => write!(f, "exactly that is prescribed")?,
-            false if bound == given => write!(
-                f,
-                "{given} is prescribed, {:.1e}π too {}",
-                -self.slack / PI,
-                if self.side == Side::Below {
-                    "little"
-                } else {
-                    "much"
-                }
-            )?,
-            false => write!(f, "{given} is prescribed")?,
-        }
-        write!(
-            f,
-            "; raise the valence there by connectivity repair, move the cones, or use the scheme `vertex-scaling` with flow.delaunay = true"
+            "{}; raise the valence there by connectivity repair, move the cones, or use the scheme `vertex-scaling` with flow.delaunay = true",
+            self.statement()
         )
     }
 }

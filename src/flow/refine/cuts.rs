@@ -9,15 +9,20 @@ use super::{Editor, MARGIN, OutOfSplits};
 use crate::flow::feasibility::{Constraint, Region};
 use crate::geometry::ids::{EdgeVec, HalfedgeId};
 
-/// Splits edges around offending sets until no set lacks edges for tangent circles.
+/// Splits edges around offending sets until no set lacks edges for tangent circles, but for sets without a link.
 pub(super) fn widen(editor: &mut Editor) -> Result<(), OutOfSplits> {
     loop {
         let shortages = shortages(editor, None, MARGIN);
         if shortages.is_empty() {
             return Ok(());
         }
+        let before = editor.splits;
         for shortage in &shortages {
-            fill(editor, shortage)?;
+            fill(editor, shortage, 1.0)?;
+        }
+        // Nothing left to split.
+        if editor.splits == before {
+            return Ok(());
         }
     }
 }
@@ -30,8 +35,9 @@ pub(super) struct Shortage {
 }
 
 impl Shortage {
-    pub fn report(&self) -> (usize, f64, f64) {
-        (self.region.vertices.len(), self.region.slack, self.link.iter().map(|l| l.1).sum())
+    /// What is missing, radians; nothing where both sides are equal.
+    pub fn lacking(&self) -> f64 {
+        -self.region.slack
     }
 }
 
@@ -49,18 +55,19 @@ pub(super) fn shortages(editor: &Editor, phi: Option<&EdgeVec<f64>>, margin: f64
             region,
         }
     };
-    // Without a link there is nothing to split.
-    regions
-        .map(shortage)
-        .filter(|s| !s.link.is_empty())
-        .collect()
+    regions.map(shortage).collect()
 }
 
-/// Splits edges of the link, long ones first, until their worth makes up for what the region lacks; one at least.
-pub(super) fn fill(editor: &mut Editor, shortage: &Shortage) -> Result<(), OutOfSplits> {
+/// Splits edges of the link, long ones first, until their worth makes up for what the region lacks, times `eagerness`; one at
+/// least, but for a region without a link, where there is nothing to split.
+pub(super) fn fill(
+    editor: &mut Editor,
+    shortage: &Shortage,
+    eagerness: f64,
+) -> Result<(), OutOfSplits> {
     let mut link = shortage.link.clone();
     // Equality is not enough: one edge at least.
-    let mut lacking = -shortage.region.slack;
+    let mut lacking = eagerness * shortage.lacking();
     while lacking >= 0.0 {
         let longest = link
             .iter()
