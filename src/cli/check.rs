@@ -81,7 +81,9 @@ fn write_region(path: &Path, glb: Option<&[u8]>) -> Result<String, Problem> {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     };
-    let mut file = super::init::builder().tempfile_in(folder).map_err(not_written)?;
+    let mut file = super::init::builder()
+        .tempfile_in(folder)
+        .map_err(not_written)?;
     file.write_all(glb).map_err(not_written)?;
     file.persist(path)
         .map_err(|error| not_written(error.error))?;

@@ -83,8 +83,8 @@ pub struct Violation {
 const LISTED: usize = 8;
 
 impl Violation {
-    /// What is wrong, without what to do about it.
-    pub fn statement(&self) -> String {
+    /// Both sides of (6), without what follows from it.
+    pub fn inequality(&self) -> String {
         let vertex = self.vertex;
         let set = match self.size {
             0 | 1 => format!("vertex {vertex}"),
@@ -113,9 +113,7 @@ impl Violation {
             }
             false => format!("{given} is prescribed"),
         };
-        format!(
-            "no circle packing exists: {set} must have {relation} than {bound} of curvature by (6), but {prescribed}"
-        )
+        format!("{set} must have {relation} than {bound} of curvature by (6), but {prescribed}")
     }
 }
 
@@ -123,8 +121,8 @@ impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{}; raise the valence there by connectivity repair, move the cones, or use the scheme `vertex-scaling` with flow.delaunay = true",
-            self.statement()
+            "no circle packing exists: {}; raise the valence there by connectivity repair, move the cones, or use the scheme `vertex-scaling` with flow.delaunay = true",
+            self.inequality()
         )
     }
 }

@@ -110,7 +110,7 @@ pub enum RefineError {
     },
     /// No number of splits that was tried made room for a circle packing.
     #[error(
-        "{}, even after {splits} splits around such regions; spread the curvature over more cones, move them, or use the scheme `vertex-scaling` with flow.delaunay = true", violation.statement()
+        "no circle packing exists, even after {splits} splits around such regions: {}; spread the curvature over more cones, move them, or use the scheme `vertex-scaling` with flow.delaunay = true", violation.inequality()
     )]
     StillInfeasible {
         /// Splits made.

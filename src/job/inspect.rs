@@ -120,9 +120,9 @@ fn plan(
             describe(&mesh, &prescription, None, line);
             return Err(BuildError::Flow(violation.into()));
         }
+        let said = violation.inequality();
         line(format!(
-            "  circle packing: as given, {}",
-            violation.statement()
+            "  circle packing: none on the connectivity as given: {said}"
         ));
     }
     let (mesh, prescription, repair) = refine_for(config, mesh, prescription)?;

@@ -7,12 +7,12 @@
 
 use super::{Editor, MARGIN, OutOfSplits};
 use crate::flow::feasibility::{Constraint, Region};
-use crate::geometry::ids::{EdgeVec, HalfedgeId};
+use crate::geometry::ids::{EdgeVec, HalfedgeId, VertexVec};
 
 /// Splits edges around offending sets until no set lacks edges for tangent circles, but for sets without a link.
 pub(super) fn widen(editor: &mut Editor) -> Result<(), OutOfSplits> {
     loop {
-        let shortages = shortages(editor, None, MARGIN);
+        let shortages = shortages(editor, None, &editor.target, MARGIN);
         if shortages.is_empty() {
             return Ok(());
         }
@@ -41,11 +41,15 @@ impl Shortage {
     }
 }
 
-/// The regions that break (6) with a margin. `phi` as for [`Constraint::new`].
-pub(super) fn shortages(editor: &Editor, phi: Option<&EdgeVec<f64>>, margin: f64) -> Vec<Shortage> {
+/// The regions that break (6) with a margin. `phi` and `target` as for [`Constraint::new`].
+pub(super) fn shortages(
+    editor: &Editor,
+    phi: Option<&EdgeVec<f64>>,
+    target: &VertexVec<f64>,
+    margin: f64,
+) -> Vec<Shortage> {
     let connectivity = &editor.mesh.connectivity;
-    let mut constraint =
-        Constraint::new(connectivity, phi, &editor.target, editor.boundary, margin);
+    let mut constraint = Constraint::new(connectivity, phi, target, editor.boundary, margin);
     let regions = constraint.offending_regions().into_iter();
     let shortage = |region: Region| {
         let link = constraint.link(&region).into_iter();

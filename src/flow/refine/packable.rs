@@ -18,19 +18,24 @@
 //! A region without a link, or the bound on splits, ends in [`RefineError::StillInfeasible`]. *Guaranteed* otherwise: (6), exactly, for the
 //! prescription returned, so the flow that follows has a minimum to find.
 
-use super::cuts::{fill, shortages};
+use super::cuts::{self, fill};
 use super::{Editor, OutOfSplits, RefineError, in_source};
-use crate::flow::cones::Prescription;
+use crate::flow::cones::{BoundaryCondition, Prescription};
 use crate::flow::feasibility::{self, Constraint};
+use crate::flow::metric::full_angles;
 use crate::flow::packing::{self, PackingError};
 use crate::flow::ricci::Scheme;
-use crate::geometry::ids::EdgeVec;
+use crate::geometry::ids::{EdgeVec, VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
 use crate::product::ConnectivityRepair;
+use std::f64::consts::PI;
 
 /// How many times the room that (6) demands shall be there; see [`feasibility`](crate::flow::feasibility). Little, since it is asked
 /// for everywhere: strong cones have had more from [`refine`](super::refine).
 const MARGIN: f64 = 1.05;
+/// How many times the cone angle of cones below −2π there shall be room for: with hardly more than (6) demands, the circles around
+/// such a cone differ in size by more than float64 can hold. (A −12π cone on fertility, with Thurston's Φ: 10²¹ with a tenth more.)
+const STRENGTH: f64 = 1.5;
 /// What a round splits more than the one before that did not halve what was lacking.
 const GROWTH: f64 = 1.5;
 /// Most that is split beyond what is counted to be lacking.
@@ -63,7 +68,8 @@ pub fn make_packable(
     Ok((mesh, prescription, repair))
 }
 
-fn widen(editor: &mut Editor, scheme: Scheme) -> Result<(), RefineError> {
+/// Splits until no region lacks room, or the editor's bound on splits is reached.
+pub(super) fn widen(editor: &mut Editor, scheme: Scheme) -> Result<(), RefineError> {
     let (mut eagerness, mut lacked) = (1.0, f64::INFINITY);
     loop {
         let phi = match intersection_angles(editor, scheme) {
@@ -71,7 +77,12 @@ fn widen(editor: &mut Editor, scheme: Scheme) -> Result<(), RefineError> {
             // Lengths that cannot be fitted are the flow's to refuse.
             Err(_) => return Ok(()),
         };
-        let shortages = shortages(editor, phi.as_ref(), MARGIN);
+        let mut shortages = cuts::shortages(editor, phi.as_ref(), &editor.target, MARGIN);
+        if shortages.is_empty()
+            && let Some(target) = with_stronger_cones(editor)
+        {
+            shortages = cuts::shortages(editor, phi.as_ref(), &target, MARGIN);
+        }
         if shortages.is_empty() {
             return Ok(());
         }
@@ -80,6 +91,13 @@ fn widen(editor: &mut Editor, scheme: Scheme) -> Result<(), RefineError> {
             eagerness = LARGEST_EAGERNESS.min(GROWTH * eagerness);
         }
         lacked = lacking;
+        tracing::debug!(
+            vertices = editor.target.len(),
+            regions = shortages.len(),
+            lacking,
+            eagerness,
+            "splitting where no packing exists"
+        );
         let before = editor.splits;
         let filled: Result<(), OutOfSplits> =
             (shortages.iter()).try_for_each(|shortage| fill(editor, shortage, eagerness));
@@ -88,6 +106,35 @@ fn widen(editor: &mut Editor, scheme: Scheme) -> Result<(), RefineError> {
             return decide(editor, scheme);
         }
     }
+}
+
+/// A prescription that asks more: cone angles of the strong cones are [`STRENGTH`] times what they are, and all other vertices
+/// give a share of theirs for it, but for a free boundary, which gives it unasked. `None` without strong cones.
+fn with_stronger_cones(editor: &Editor) -> Option<VertexVec<f64>> {
+    let c = &editor.mesh.connectivity;
+    let full = full_angles(c);
+    let free = editor.boundary == BoundaryCondition::Free && !c.is_closed();
+    let strong = |v: VertexId| !c.is_boundary_vertex(v) && editor.target[v] < -2.0 * PI - 1e-9;
+    let angle = |v: VertexId| full[v] - editor.target[v];
+    let sum = |of_strong: bool| -> f64 {
+        let vertices = c.vertices().filter(|&v| strong(v) == of_strong);
+        vertices.map(angle).sum()
+    };
+    if !c.vertices().any(strong) {
+        return None;
+    }
+    // On tiny meshes the others have not so much to give; splits will change that.
+    let (cones, others) = (sum(true), sum(false));
+    let extra = match free {
+        true => STRENGTH - 1.0,
+        false => (STRENGTH - 1.0).min(0.5 * others / cones),
+    };
+    let share = if free { 0.0 } else { extra * cones / others };
+    let target = c.vertices().map(|v| match strong(v) {
+        true => editor.target[v] - extra * angle(v),
+        false => editor.target[v] + share * angle(v),
+    });
+    Some(target.collect())
 }
 
 /// Nothing is left to split, or nothing may be: then (6) itself must hold, if not with the margin.

@@ -64,7 +64,7 @@ pub(super) fn line(verdict: Option<&Verdict>, mesh: &Mesh, flow: &FlowParams) ->
         }
         Some(Verdict::Impossible(violation)) => {
             let said = in_source(violation.clone(), mesh);
-            format!("  circle packing: {}", said.statement())
+            format!("  circle packing: none: {}", said.inequality())
         }
         None if flow.flips() => {
             "  flat metric: exists; with flips Gauss–Bonnet and positive cone angles are all it takes, and both hold".into()

@@ -263,7 +263,7 @@ fn verdict_and_least_slack_are_those_of_all_subsets() {
     let (mut cases, mut loops, mut topologies) = (0, 0, std::collections::BTreeSet::new());
     let mut phis = [0usize; 4];
     let mut round = 0;
-    while cases < 900 {
+    while cases < 2000 {
         round += 1;
         let Some(case) = draw(round, &mut random) else {
             continue;
