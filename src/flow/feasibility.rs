@@ -121,7 +121,7 @@ impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "no circle packing exists: {}; raise the valence there by connectivity repair, move the cones, or use the scheme `vertex-scaling` with flow.delaunay = true",
+            "no circle packing exists: {}; let connectivity repair split edges there (connectivity.enabled = true), move the cones, or use the scheme `vertex-scaling` with flow.delaunay = true",
             self.inequality()
         )
     }

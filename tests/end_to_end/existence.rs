@@ -38,7 +38,7 @@ fn without_repair_the_region_is_named_and_drawn() {
     let path = folder.path().join("region.glb");
     let (said, code) = check(&settings, Some(&path));
     assert_eq!(code, Some(1), "{said}");
-    insta::assert_snapshot!(verdict(&said), @"");
+    insta::assert_snapshot!(verdict(&said), @"refused: no circle packing exists: vertex 2577 must have more than -4π of curvature by (6), but -8π is prescribed; let connectivity repair split edges there (connectivity.enabled = true), move the cones, or use the scheme `vertex-scaling` with flow.delaunay = true");
     // The build refuses in the same words.
     let built = build(Path::new(PRETZEL), &settings);
     assert_eq!(built.code(), Some(1));
@@ -82,7 +82,7 @@ fn other_schemes_say_what_they_need() {
     let (said, code) = check(&["cones.strategy=single"], Some(&path));
     assert_eq!(code, Some(0), "{said}");
     assert!(!path.exists() && said.contains("region: none to show"));
-    insta::assert_snapshot!(verdict(&said), @"");
+    insta::assert_snapshot!(verdict(&said), @"flat metric: exists; with flips Gauss–Bonnet and positive cone angles are all it takes, and both hold");
     let (said, _) = check(&["flow.scheme=inversive-distance"], None);
-    insta::assert_snapshot!(verdict(&said), @"");
+    insta::assert_snapshot!(verdict(&said), @"flat metric: Gauss–Bonnet and positive cone angles hold; whether this scheme has one on this connectivity is not known before the flow");
 }
