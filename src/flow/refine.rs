@@ -16,9 +16,6 @@
 //!    Raising the cone's valence alone is not enough: a −12π cone needs more than 14 edges around *every* disk.
 //! 2. **Vertices in the first rings** (`rings`): valence ≥ 6 (`ring_valence`), but for other cones and for the boundary.
 //!
-//! 3. **All sets** (`cuts`), where a cone is stronger than −2π: a disk of rings may pass a narrow neck askew, and the
-//!    shortest loop around the neck is what counts. One maximum flow finds the worst set of all; 1.5 D/π edges again.
-//!
 //! On a boundary that is not free every vertex must moreover have angle enough: about 2 − 2K̄/π faces.
 //!
 //! # Operations
@@ -29,7 +26,8 @@
 //! Longest edges go first, which spreads the splits evenly.
 //!
 //! The criteria are for every flow that keeps the connectivity, also where no (6) is known. *Not guaranteed:* that (6) then holds for
-//! every set: for circle packings [`make_packable`] decides that, and splits more edges where it fails, until it holds.
+//! every set: a disk of rings may pass a narrow neck askew, and the shortest loop around the neck is what counts. For
+//! circle packings [`make_packable`] decides (6), and splits more edges where it fails, until it holds.
 
 mod cuts;
 mod links;
@@ -269,10 +267,6 @@ impl Editor {
                 links::widen(self, cone, params.rings)?;
             }
             rings::raise(self, params)?;
-            let strong = |&v: &VertexId| self.target[v] < -2.0 * PI - 1e-9;
-            if self.interior_cones().iter().any(strong) {
-                cuts::widen(self)?;
-            }
             if self.splits == before {
                 return Ok(());
             }

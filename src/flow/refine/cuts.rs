@@ -1,31 +1,12 @@
-//! Enough edges around *every* set of vertices: criterion 3 of [`super`].
+//! The sets of vertices that lack edges, and the splits that make up for it.
 //!
-//! [`feasibility`](crate::flow::feasibility) finds the sets that lack edges, with a margin. Splitting an edge of a set's link
+//! [`feasibility`](crate::flow::feasibility) finds the sets, with a margin. Splitting an edge of a set's link
 //! gives it one edge more, and what that edge is worth, π − Φ of its halves, is taken to be what the whole was worth:
 //! exact for Φ ≡ 0, a guess otherwise, since Φ follows from the new lengths.
-//! For flat disks and Φ ≡ 0 a margin of 1.5 asks for a link of 3, which every disk has, so nothing far from the cones is touched.
 
-use super::{Editor, MARGIN, OutOfSplits};
+use super::{Editor, OutOfSplits};
 use crate::flow::feasibility::{Constraint, Region};
 use crate::geometry::ids::{EdgeVec, HalfedgeId, VertexVec};
-
-/// Splits edges around offending sets until no set lacks edges for tangent circles, but for sets without a link.
-pub(super) fn widen(editor: &mut Editor) -> Result<(), OutOfSplits> {
-    loop {
-        let shortages = shortages(editor, None, &editor.target, MARGIN);
-        if shortages.is_empty() {
-            return Ok(());
-        }
-        let before = editor.splits;
-        for shortage in &shortages {
-            fill(editor, shortage, 1.0)?;
-        }
-        // Nothing left to split.
-        if editor.splits == before {
-            return Ok(());
-        }
-    }
-}
 
 /// A region that lacks edges, and what each edge of its link is worth.
 pub(super) struct Shortage {
@@ -37,7 +18,7 @@ pub(super) struct Shortage {
 impl Shortage {
     /// What is missing, radians; nothing where both sides are equal.
     pub fn lacking(&self) -> f64 {
-        -self.region.slack
+        self.region.slack.abs()
     }
 }
 

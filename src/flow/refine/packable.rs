@@ -3,7 +3,7 @@
 //! *Enters:* a mesh, a prescription, a scheme. *Leaves:* the same surface with more vertices, for which (6) holds for every
 //! set, or the region that still breaks it.
 //!
-//! Around cones [`refine`](super::refine) has counted edges beforehand. What it cannot know are the intersection angles Φ of a
+//! Around cones [`refine`](super::refine) has counted edges of disks beforehand. What it cannot know are loops around narrow necks, and the intersection angles Φ of a
 //! Thurston packing: they follow from the lengths (1), and with Φ up to π/2 a *flat* vertex of
 //! valence 4 or 5, or a flat region of such vertices, can lack room. So the packing is fitted, (6) is decided for all sets,
 //! the links of those that break it are split, and the packing is fitted again: the certificate of the decision tells where and how much.
