@@ -51,7 +51,10 @@ fn record(output: &Path, config: &Config, outcomes: &[AssetOutcome]) -> Result<(
 
 fn inspect(asset: &Asset, config: &Config) -> Result<Inspection, Failure> {
     let inspection = job::inspect(&asset.path, config).map_err(|e| Failure::from(&e))?;
+    let region = inspection.region_glb().transpose();
+    let region = region.map_err(|e| Failure::from(&BuildError::Export(e)))?;
     Ok(Inspection {
+        region,
         text: inspection.to_string(),
         refused: !inspection.failures().is_empty(),
     })

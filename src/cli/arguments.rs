@@ -92,9 +92,10 @@ const CHECK_EXAMPLES: &str = "\
 Examples:
   affine-atlas check                  what ./config.toml says
   affine-atlas check scan.ply         one mesh, default settings
+  affine-atlas check scan.ply --set flow.scheme=thurston --region region.glb
 
 Shows for each mesh: components, vertices, faces, genus, boundary loops, the total curvature its
-cones must have, and what would be repaired.";
+cones must have, what would be repaired, and whether the metric asked for exists.";
 
 const CONES_EXAMPLES: &str = "\
 Examples:
@@ -148,6 +149,10 @@ pub struct Build {
 pub struct Check {
     #[command(flatten)]
     pub inputs: Inputs,
+    /// Where no circle packing exists for the mesh as it is: write the surface in grey with the worst
+    /// region in colour, and the region's vertices in its extras; with several meshes, a file each
+    #[arg(long, value_name = "FILE.glb")]
+    pub region: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -31,6 +31,8 @@ pub struct Inspection {
     pub text: String,
     /// Whether a build would be refused for what is known already.
     pub refused: bool,
+    /// A GLB of the regions for which no circle packing exists, where there are any.
+    pub region: Option<Vec<u8>>,
 }
 
 /// What `cones` is asked for one asset.

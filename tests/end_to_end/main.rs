@@ -3,6 +3,7 @@
 mod arrays;
 mod boundaries;
 mod command;
+mod existence;
 mod flows;
 mod good;
 #[cfg(unix)]
