@@ -22,7 +22,7 @@ pub fn prediction(file: &Path) -> Result<(), String> {
     let mesh = models::mesh(&models::read(file));
     for count in [4, 8, 16] {
         let params = ConeParams {
-            count,
+            count: Some(count),
             ..ConeParams::default()
         };
         let (given, _) = models::choose(&mesh, &params, BoundaryCondition::Free)?;

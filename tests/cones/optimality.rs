@@ -50,7 +50,7 @@ pub fn brute_force(shape: Shape) -> Result<(), String> {
         };
         for count in counts.clone() {
             let params = ConeParams {
-                count,
+                count: Some(count),
                 ..ConeParams::default()
             };
             let (_, chosen) = models::choose(&mesh, &params, condition)?;
@@ -115,7 +115,7 @@ impl Energy {
         if surface.is_closed() {
             let spread = ConeParams {
                 strategy: ConeStrategy::Spread,
-                count: 4,
+                count: Some(4),
                 ..ConeParams::default()
             };
             let strategy = match surface.topology().euler_characteristic {

@@ -96,7 +96,7 @@ pub fn invariance(file: &Path, objective: ConeObjective) -> Result<(), String> {
 
 fn params(count: usize, objective: ConeObjective) -> ConeParams {
     ConeParams {
-        count,
+        count: Some(count),
         objective,
         ..ConeParams::default()
     }
