@@ -2,6 +2,7 @@
 
 mod area;
 mod moves;
+mod pairs;
 mod picture;
 mod placement;
 mod quadratic;

@@ -23,6 +23,8 @@ use crate::flow::solve::solve_dense;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::VertexId;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Share of the energy that an exchange must gain while the search looks for the right part of the surface …
 const COARSE_GAIN: f64 = 1e-2;
@@ -36,6 +38,8 @@ const PASSES: usize = 12;
 const SAMPLES: usize = 2000;
 /// Samples to climb from.
 const SUMMITS: usize = 6;
+/// Numbers in the columns that are kept.
+const KNOWN: usize = 1 << 25;
 /// Samples a thread looks at in one go.
 const PIECE: usize = 256;
 
@@ -58,13 +62,15 @@ pub(super) struct Placement<'a> {
     pub(super) self_energy: Vec<f64>,
     /// Where the search begins.
     pub(super) samples: Vec<usize>,
+    /// Columns of B that were computed: the search comes back to the same places again and again.
+    known: BTreeMap<usize, Arc<[f64]>>,
 }
 
 /// A vertex with its column of B.
 #[derive(Clone)]
 pub(super) struct Site {
     pub(super) vertex: usize,
-    column: Vec<f64>,
+    column: Arc<[f64]>,
 }
 
 /// Chosen places and their best curvatures.
@@ -100,6 +106,7 @@ impl<'a> Placement<'a> {
             sink,
             limits,
             allowed,
+            known: BTreeMap::new(),
         };
         placement.slope = placement.base.clone();
         placement.picture.centre(&mut placement.slope);
@@ -144,17 +151,27 @@ impl<'a> Placement<'a> {
 
     /// Columns of B.
     pub(super) fn sites(&mut self, vertices: &[usize]) -> Vec<Site> {
-        let mut fields = self.responses(vertices);
         let n = self.len();
+        if (self.known.len() + vertices.len()) * n > KNOWN {
+            self.known.clear();
+        }
+        let mut new: Vec<usize> = vertices.to_vec();
+        new.retain(|v| !self.known.contains_key(v));
+        new.sort_unstable();
+        new.dedup();
+        let mut fields = self.responses(&new);
         for field in fields.chunks_mut(n) {
             self.picture.centre(field);
         }
         self.dual(&mut fields);
-        let columns = fields.chunks(n).map(<[f64]>::to_vec);
-        let sites = vertices.iter().zip(columns);
-        sites
-            .map(|(&vertex, column)| Site { vertex, column })
-            .collect()
+        let columns = new.iter().zip(fields.chunks(n));
+        self.known
+            .extend(columns.map(|(&v, column)| (v, Arc::from(column))));
+        let site = |&vertex: &usize| {
+            let column = self.known.get(&vertex)?.clone();
+            Some(Site { vertex, column })
+        };
+        vertices.iter().filter_map(site).collect()
     }
 
     /// The best curvatures at given places; `None` where the places are too close to each other to tell them apart.
@@ -184,7 +201,7 @@ impl<'a> Placement<'a> {
     ///
     /// Where curvatures are at a limit, two are named: one for cones that stay there, and one for cones that need not, because the new one
     /// relieves them. The second matters most where too few cones must make up the total and all are at their limits.
-    fn best_additions(&self, choice: &Choice) -> Vec<(usize, f64)> {
+    pub(super) fn best_additions(&self, choice: &Choice) -> Vec<(usize, f64)> {
         let mut found: Vec<(usize, f64)> = Vec::new();
         if choice.best.is_inside.iter().any(|inside| !inside) {
             let unlimited = Limits {
@@ -287,7 +304,12 @@ impl<'a> Placement<'a> {
     }
 
     /// The best of `sites` with one of some vertices put at a place of the list.
-    fn with_one_of(&mut self, sites: &[Site], at: usize, vertices: &[usize]) -> Option<Choice> {
+    pub(super) fn with_one_of(
+        &mut self,
+        sites: &[Site],
+        at: usize,
+        vertices: &[usize],
+    ) -> Option<Choice> {
         let new = self.sites(vertices);
         let choices = new.into_iter().filter_map(|site| {
             let mut sites = sites.to_vec();
@@ -361,6 +383,7 @@ impl<'a> Placement<'a> {
                 break;
             }
         }
+        choice = self.exchange_pairs(choice, COARSE_GAIN);
         Some(self.exchange(choice, FINE_GAIN))
     }
 
