@@ -9,12 +9,13 @@ use affine_atlas::config::Config;
 use affine_atlas::config::assets::Asset;
 use affine_atlas::export::folder::remove_all_staging;
 use affine_atlas::export::manifest::{Manifest, Record};
+use affine_atlas::job::survey::folder_name as survey_folder;
 use affine_atlas::job::{self, BuildError};
 use affine_atlas::observe::Observer;
 use affine_atlas::outcome::{AssetOutcome, Failure, FailureKind};
 use affine_atlas::read::{self, ReadParams};
 use affine_atlas::verify::{self, SourceSurface, VerifyOptions};
-use cli::work::{Inspection, VerifyRequest, VerifyResult, Work};
+use cli::work::{Inspection, SurveyRequest, Surveyed, VerifyRequest, VerifyResult, Work};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -23,6 +24,8 @@ const WORK: Work = Work {
     build,
     record,
     inspect,
+    survey,
+    survey_folder,
     verify,
     remove_staging: remove_all_staging,
 };
@@ -48,10 +51,40 @@ fn record(output: &Path, config: &Config, outcomes: &[AssetOutcome]) -> Result<(
 
 fn inspect(asset: &Asset, config: &Config) -> Result<Inspection, Failure> {
     let inspection = job::inspect(&asset.path, config).map_err(|e| Failure::from(&e))?;
+    let region = inspection.region_glb().transpose();
+    let region = region.map_err(|e| Failure::from(&BuildError::Export(e)))?;
     Ok(Inspection {
+        region,
         text: inspection.to_string(),
         refused: !inspection.failures().is_empty(),
     })
+}
+
+fn survey(request: &SurveyRequest<'_>, observer: &dyn Observer) -> Surveyed {
+    let SurveyRequest {
+        asset,
+        output,
+        config,
+        counts,
+    } = *request;
+    let given = asset.given.to_string_lossy();
+    let (survey, outcome) = job::survey::run(
+        &asset.path,
+        &given,
+        output,
+        &asset.id,
+        config,
+        counts,
+        observer,
+    );
+    Surveyed {
+        text: survey.as_ref().map(ToString::to_string).unwrap_or_default(),
+        json: survey.as_ref().map(|survey| survey.json(true)),
+        suggested: survey
+            .as_ref()
+            .and_then(|survey| survey.suggested_config(&outcome.files)),
+        outcome,
+    }
 }
 
 fn verify(request: &VerifyRequest) -> Result<VerifyResult, Failure> {

@@ -28,19 +28,18 @@ pub fn measure(
     charts: &Charts,
     prescription: &Prescription,
 ) -> Quality {
-    let (area_distortion, log_scale, angle_error) = distortion(mesh, metric, central);
-    let cut_length = cut
-        .is_cut
-        .enumerate()
-        .filter(|&(_, &is_cut)| is_cut)
-        .map(|(e, _)| mesh.edge_length(e))
-        .sum();
+    let chart = |f: FaceId| Some(0.5 * doubled_area(central.uv[f]));
+    let Distortion {
+        area_distortion,
+        log_scale,
+        angle_error,
+    } = distortion_in(mesh, metric, chart);
     Quality {
         area_distortion,
         log_scale,
         angle_error,
         layout_closing_error: closing_error(mesh, cut, central, metric),
-        cut_length,
+        cut_length: cut_length(mesh, cut),
         transition_residual: transition_residual(charts, cut, central, mesh),
         holonomy_error: holonomy_error(mesh, cut, charts, prescription),
         cocycle_error: cocycle_error(mesh, cut, central, charts),
@@ -73,8 +72,37 @@ struct Row {
     flat_angles: [f64; 3],
 }
 
-/// (9), log scale and angle error; faces without area in space have no scale and are left out.
-fn distortion(mesh: &Mesh, metric: &FlatMetric, central: &Development) -> (f64, Spread, MeanMax) {
+/// How far a flat metric is from the one in space.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Distortion {
+    /// (9), both areas normalised to 1.
+    pub area_distortion: f64,
+    /// ½ ln(flat area / source area) a face, both totals 1, weighted by source area.
+    pub log_scale: Spread,
+    /// Difference of corner angles, radians.
+    pub angle_error: MeanMax,
+}
+
+/// The distortion of a metric that need not be developed: of (9) the flat areas are those by its lengths, which differ from
+/// a chart's by rounding only.
+pub fn distortion(mesh: &Mesh, metric: &FlatMetric) -> Distortion {
+    let flat = |f| area(mesh.connectivity.face_edges(f).map(|e| metric.length[e]));
+    distortion_in(mesh, metric, flat)
+}
+
+/// Length of the cut in space, source units.
+pub fn cut_length(mesh: &Mesh, cut: &CutGraph) -> f64 {
+    let edges = cut.is_cut.enumerate().filter(|&(_, &is_cut)| is_cut);
+    // The sum of nothing is −0.
+    edges.map(|(e, _)| mesh.edge_length(e)).sum::<f64>() + 0.0
+}
+
+/// (9) for the areas of the chart, log scale and angle error; faces without area in space have no scale and are left out.
+fn distortion_in(
+    mesh: &Mesh,
+    metric: &FlatMetric,
+    chart_area: impl Fn(FaceId) -> Option<f64>,
+) -> Distortion {
     let c = &mesh.connectivity;
     let measure = |f| {
         let p = mesh.face_positions(f);
@@ -86,7 +114,7 @@ fn distortion(mesh: &Mesh, metric: &FlatMetric, central: &Development) -> (f64, 
         ];
         Some(Row {
             source_area: triangle_area(p),
-            chart_area: 0.5 * doubled_area(central.uv[f]),
+            chart_area: chart_area(f)?,
             flat_area: area(flat)?,
             source_angles: angles(space)?,
             flat_angles: angles(flat)?,
@@ -121,7 +149,11 @@ fn distortion(mesh: &Mesh, metric: &FlatMetric, central: &Development) -> (f64, 
         }
     }
     scale.std = (mean_square - mean * mean).max(0.0).sqrt();
-    (area_distortion, scale, angle)
+    Distortion {
+        area_distortion,
+        log_scale: scale,
+        angle_error: angle,
+    }
 }
 
 /// Worst difference between an edge's length in the chart and its flat length, and between its ends

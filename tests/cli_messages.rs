@@ -361,6 +361,7 @@ fn help() {
     Commands:
       build   Build an atlas of each mesh
       check   Say what a build would do, and build nothing
+      cones   Show what more or fewer cones gain, and write lists of them
       verify  Read atlases back and check every property they must have
       init    Write a configuration file that explains every key
       help    Print this message or the help of the given subcommand(s)
@@ -414,13 +415,52 @@ fn help() {
     Each mesh becomes a folder OUT/NAME with atlas.json, atlas.npz, surface.glb, images/ and pictures.
     It appears when it is complete; an older good folder stays if the build fails.
     ");
+    insta::assert_snapshot!(stdout(&run(folder.path(), &["cones", "-h"])), @r"
+    Show what more or fewer cones gain, and write lists of them
+
+    Usage: affine-atlas cones [OPTIONS] [CONFIG|MESH]...
+
+    Arguments:
+      [CONFIG|MESH]...  A configuration (ends in .toml), meshes (glTF, GLB, OBJ, PLY, STL, OFF), or
+                        both: meshes then take the place of `input.paths` [default: config.toml]
+
+    Options:
+          --set <KEY=VALUE>      Set a key of the configuration, for example `flow.scheme=thurston`; may
+                                 be repeated
+      -o, --out <DIR>            Folder for the results [default: output.folder of the configuration, or
+                                 affine-atlas-out]
+          --counts <N,N,...>     Numbers of cones to try [default: 0,4,8,16,32, as far as the surface
+                                 allows]
+          --json                 Write one JSON array instead of tables
+      -q, --quiet                Show errors only
+      -v, --verbose...           Show each step; twice: everything
+          --log-format <FORMAT>  Progress and errors as text, or as one JSON object a line (both on
+                                 standard error) [default: text] [possible values: text, json]
+          --threads <N>          Threads to use; 0 takes one for each core [default: run.threads of the
+                                 configuration]
+      -h, --help                 Print help (see more with '--help')
+
+    Examples:
+      affine-atlas cones bunny.obj                    0, 4, 8, 16 and 32 cones, as far as possible
+      affine-atlas cones bunny.obj --counts 6,12 --out trials
+      affine-atlas cones bunny.obj --set cones.quantum=1/2 --set cones.objective=area-distortion
+      affine-atlas build affine-atlas-out/bunny.cones/bunny.cones-8.toml
+
+    Flattens the surface with each number of cones, chosen by the program, and shows area distortion
+    (9), log scale u and length of the cut, beside those of equal cones far apart (of none, where the
+    surface needs none). Each mesh gets a folder OUT/NAME.cones with, for each number N:
+      NAME.cones-N.toml  a configuration that builds exactly this
+      NAME.cones-N.txt   the same cones as two columns: vertex (from 0) and curvature in radians
+      NAME.cones-N.png   the log scale before and after
+    and cones.png (all in a row) and cones.json (the table). It appears when it is complete.
+    ");
 }
 
 /// Every command's help shows an example of it.
 #[test]
 fn help_has_examples() {
     let folder = folder();
-    for command in ["build", "check", "verify", "init"] {
+    for command in ["build", "check", "cones", "verify", "init"] {
         for flag in ["-h", "--help"] {
             let text = stdout(&run(folder.path(), &[command, flag]));
             assert!(
@@ -469,4 +509,199 @@ fn a_missing_mesh_fails_its_asset() {
     );
     assert_eq!(stdout(&quiet), "");
     assert_eq!(quiet.status.code(), output.status.code());
+}
+
+const TETRAHEDRON: &str =
+    "v 1 1 1\nv 1 -1 -1\nv -1 1 -1\nv -1 -1 1\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 2 4 3\n";
+
+/// A folder with a tetrahedron, a file of cones, and a configuration that names it.
+fn cone_file(cones: &str, keys: &str) -> tempfile::TempDir {
+    let folder = folder();
+    let write = |name: &str, text: &str| {
+        std::fs::write(folder.path().join(name), text).expect("written");
+    };
+    write("tetra.obj", TETRAHEDRON);
+    write("my.cones.txt", cones);
+    write(
+        "config.toml",
+        &format!("[cones]\nfile = \"my.cones.txt\"\n{keys}"),
+    );
+    folder
+}
+
+fn cone_file_refusal(cones: &str, keys: &str, code: i32) -> String {
+    let folder = cone_file(cones, keys);
+    let text = refusal(
+        folder.path(),
+        &["build", "config.toml", "tetra.obj", "--quiet"],
+        code,
+    );
+    assert!(!folder.path().join("affine-atlas-out/tetra").exists());
+    text
+}
+
+#[test]
+fn cone_files_that_are_no_lists_of_cones() {
+    insta::assert_snapshot!(cone_file_refusal("0 1\n1\n", "", 2), @r"
+     error: a line of cones.file must have 2 columns, a vertex and a curvature in radians, but this
+     | has 1
+      ,-[my.cones.txt:2:1]
+    1 | 0 1
+    2 | 1
+      : ^
+      `----
+     help: each line holds the number of a vertex and its curvature in radians, for example `17
+           1.570796`; `cones.file_first_vertex` says where numbers begin
+    ");
+    insta::assert_snapshot!(cone_file_refusal("# ears\nleft 1.5\n", "", 2), @r#"
+     error: a line of cones.file begins with the number of a vertex, but "left" is none
+      ,-[my.cones.txt:2:1]
+    1 | # ears
+    2 | left 1.5
+      : ^^^^
+      `----
+     help: each line holds the number of a vertex and its curvature in radians, for example `17
+           1.570796`; `cones.file_first_vertex` says where numbers begin
+    "#);
+    insta::assert_snapshot!(cone_file_refusal("0 nan\n", "", 2), @r#"
+     error: a curvature is a finite number of radians, but "nan" is none
+      ,-[my.cones.txt:1:3]
+    1 | 0 nan
+      :   ^^^
+      `----
+     help: each line holds the number of a vertex and its curvature in radians, for example `17
+           1.570796`; `cones.file_first_vertex` says where numbers begin
+    "#);
+    insta::assert_snapshot!(cone_file_refusal("0 1\n\n0 2\n", "", 2), @r"
+     error: vertex 0 has a cone on line 1 already
+      ,-[my.cones.txt:3:1]
+    2 |
+    3 | 0 2
+      : ^
+      `----
+     help: each line holds the number of a vertex and its curvature in radians, for example `17
+           1.570796`; `cones.file_first_vertex` says where numbers begin
+    ");
+    insta::assert_snapshot!(cone_file_refusal("0 1\n", "file_first_vertex = 1\n", 2), @r"
+     error: the vertices of this file count from 1, but it names vertex 0: set
+     | cones.file_first_vertex = 0 if they count from 0
+      ,-[my.cones.txt:1:1]
+    1 | 0 1
+      : ^
+      `----
+     help: each line holds the number of a vertex and its curvature in radians, for example `17
+           1.570796`; `cones.file_first_vertex` says where numbers begin
+    ");
+}
+
+#[test]
+fn cone_files_that_do_not_fit_the_mesh_or_the_keys() {
+    let pi = "0 3.14159\n1 3.14159\n2 3.14159\n";
+    insta::assert_snapshot!(cone_file_refusal(&format!("{pi}9 3.14159"), "", 1), @"failed: tetra (prescription): cones.file line 4 names vertex 9, but the file has 4 vertices (0 to 3): correct the index");
+    insta::assert_snapshot!(cone_file_refusal("1 3.14\n5 3.14", "file_first_vertex = 1\n", 1), @"failed: tetra (prescription): cones.file line 2 (5 there, where vertices count from 1) names vertex 4, but the file has 4 vertices (0 to 3): correct the index");
+    // Three digits are too few.
+    insta::assert_snapshot!(cone_file_refusal("0 3.14\n1 3.14\n2 3.14\n3 3.14", "", 1), @"failed: tetra (prescription): the prescribed curvatures sum to 3.9979721705π (12.560000000 rad), but Gauss–Bonnet requires 2πχ = 4π (12.566370614 rad) on a surface with χ = 2 (genus 0, 0 boundary loops): change the total by 0.0020278295π");
+    insta::assert_snapshot!(cone_file_refusal(pi, "strategy = \"spread\"\n", 1), @r#"failed: tetra (prescription): cones.file and cones.strategy = "spread" exclude each other: remove one of them"#);
+    insta::assert_snapshot!(cone_file_refusal(pi, "list = [{ vertex = 0, curvature = 1 }]\n", 2), @r"
+    error: `cones.list` and `cones.file` both name cones
+    help: remove one of them
+    ");
+    insta::assert_snapshot!(cone_file_refusal(pi, "max_curvature = 2\n", 2), @r#"
+     error: `cones.max_curvature` takes a number or a fraction such as "1/2", from 0 to below 2, but
+     | was given 2
+      ,-[config.toml:3:17]
+    2 | file = "my.cones.txt"
+    3 | max_curvature = 2
+      :                 ^
+      `----
+     help: `cones.max_curvature`: a number or a fraction such as "1/2", from 0 to below 2, in
+           multiples of π; default "3/2"
+    "#);
+    let folder = folder();
+    insta::assert_snapshot!(refusal(folder.path(), &["build", "a.obj", "--set", "cones.file=b.txt"], 2), @r"
+    error: the cone file b.txt cannot be read: there is no such file
+    help: `cones.file` starts at the configuration's folder (with `--set` at the current one); check
+          the name and that it is UTF-8 text
+    ");
+}
+
+/// What peers write is rounded: the miss is shared out, and said.
+#[test]
+fn rounding_of_a_cone_file_is_shared_out_with_a_note() {
+    let text = "1 3.14159\n2 3.14159\n3 3.14159\n4 3.14159 # MovingCones counts from 1\n";
+    let folder = cone_file(text, "file_first_vertex = 1\n");
+    let output = run(folder.path(), &["check", "config.toml", "tetra.obj"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    insta::assert_snapshot!(stderr(&output).trim_start(), @"WARN the curvatures of cones.file sum to 12.566360000 rad instead of 12.566370614, as far off as rounding of their text can be: shared out among 4 cones");
+    insta::assert_snapshot!(stdout(&output), @r"
+    tetra (tetra.obj)
+    4 vertices, 4 triangles, 1 component
+      repair: nothing
+      topology: genus 0, 0 boundary loops, Euler characteristic 2
+      connectivity repair: off
+      Gauss–Bonnet: 4π required, 4π prescribed
+      4 cones of 1π: at vertices 0, 1, 2 and 3 of the file
+    ");
+}
+
+/// The table of a survey without its seconds.
+#[test]
+fn a_survey_says_what_cones_gain() {
+    let folder = cone_file("", "");
+    let arguments = ["cones", "tetra.obj", "--set", "pictures.enabled=false"];
+    let output = run(
+        folder.path(),
+        &[&arguments[..], &["--counts", "0,4"]].concat(),
+    );
+    assert_eq!(output.status.code(), Some(1), "0 cones cannot be");
+    let without_seconds = |line: &str| match line.rsplit_once("  ") {
+        Some((rest, last)) if last.trim().parse::<f64>().is_ok() => rest.trim_end().to_owned(),
+        _ => line.to_owned(),
+    };
+    let text: Vec<String> = stdout(&output).lines().map(without_seconds).collect();
+    insta::assert_snapshot!(text.join("\n"), @r#"
+    tetra (tetra.obj)
+      4 vertices, 4 triangles, genus 0, 0 boundary loops: cones need 4π in total
+      cones     placed  distortion (9)  std of u  least u  greatest u  angle error     cut  cut/√area  seconds
+      spread 4       4          0.0000    0.0000    +0.00       +0.00      0.0000π  8.4853       2.28
+      none      a closed surface of genus 0 (χ = 2) needs cones of total curvature 4π, but there are none: set cones.strategy = "auto" or "spread", or list cones
+      auto 4         4          0.0000    0.0000    +0.00       +0.00      0.0000π  8.4853       2.28
+      suggested: 4, for no other number was tried (standard deviation of the log scale 0.000)
+    wrote affine-atlas-out/tetra.cones (3 files)
+    build it with: affine-atlas build affine-atlas-out/tetra.cones/tetra.cones-4.toml
+    "#);
+    assert!(stderr(&output).contains("[1/1] tetra: failed after"));
+    // By default only what can be is tried.
+    let output = run(folder.path(), &arguments);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(
+        stderr(&output).contains("[1/1] tetra: surveyed after"),
+        "{}",
+        stderr(&output)
+    );
+    assert!(!stdout(&output).contains("none"), "{}", stdout(&output));
+}
+
+#[test]
+fn a_survey_keeps_what_is_not_its_own() {
+    let folder = cone_file("", "");
+    let place = folder.path().join("out/tetra.cones");
+    std::fs::create_dir_all(&place).expect("created");
+    std::fs::write(place.join("notes.txt"), "mine").expect("written");
+    let text = refusal(
+        folder.path(),
+        &["cones", "tetra.obj", "--out", "out", "--quiet"],
+        1,
+    );
+    insta::assert_snapshot!(text, @"failed: tetra (output): out/tetra.cones exists and holds no earlier atlas, so it is not replaced; move it away or choose another output folder");
+    assert!(place.join("notes.txt").exists());
+    // Nor an input that lies in an older folder of ours.
+    std::fs::write(place.join("cones.json"), "{}").expect("written");
+    std::fs::write(place.join("tetra.obj"), TETRAHEDRON).expect("written");
+    let arguments = ["cones", "out/tetra.cones/tetra.obj", "--out", "out"];
+    insta::assert_snapshot!(refusal(folder.path(), &arguments, 2), @r"
+    error: the output folder out/tetra.cones of this run would replace the folder of its input out/
+    | tetra.cones/tetra.obj
+    help: choose another folder with `--out`
+    ");
 }

@@ -67,6 +67,9 @@ pub enum Command {
     /// Say what a build would do, and build nothing
     #[command(after_help = CHECK_EXAMPLES, after_long_help = CHECK_EXAMPLES)]
     Check(Check),
+    /// Show what more or fewer cones gain, and write lists of them
+    #[command(after_help = CONES_EXAMPLES, after_long_help = CONES_EXAMPLES)]
+    Cones(Cones),
     /// Read atlases back and check every property they must have
     #[command(after_help = VERIFY_EXAMPLES, after_long_help = VERIFY_EXAMPLES)]
     Verify(Verify),
@@ -89,9 +92,25 @@ const CHECK_EXAMPLES: &str = "\
 Examples:
   affine-atlas check                  what ./config.toml says
   affine-atlas check scan.ply         one mesh, default settings
+  affine-atlas check scan.ply --set flow.scheme=thurston --region region.glb
 
 Shows for each mesh: components, vertices, faces, genus, boundary loops, the total curvature its
-cones must have, and what would be repaired.";
+cones must have, what would be repaired, and whether the metric asked for exists.";
+
+const CONES_EXAMPLES: &str = "\
+Examples:
+  affine-atlas cones bunny.obj                    0, 4, 8, 16 and 32 cones, as far as possible
+  affine-atlas cones bunny.obj --counts 6,12 --out trials
+  affine-atlas cones bunny.obj --set cones.quantum=1/2 --set cones.objective=area-distortion
+  affine-atlas build affine-atlas-out/bunny.cones/bunny.cones-8.toml
+
+Flattens the surface with each number of cones, chosen by the program, and shows area distortion
+(9), log scale u and length of the cut, beside those of equal cones far apart (of none, where the
+surface needs none). Each mesh gets a folder OUT/NAME.cones with, for each number N:
+  NAME.cones-N.toml  a configuration that builds exactly this
+  NAME.cones-N.txt   the same cones as two columns: vertex (from 0) and curvature in radians
+  NAME.cones-N.png   the log scale before and after
+and cones.png (all in a row) and cones.json (the table). It appears when it is complete.";
 
 const VERIFY_EXAMPLES: &str = "\
 Examples:
@@ -130,6 +149,25 @@ pub struct Build {
 pub struct Check {
     #[command(flatten)]
     pub inputs: Inputs,
+    /// Where no circle packing exists for the mesh as it is: write the surface in grey with the worst
+    /// region in colour, and the region's vertices in its extras; with several meshes, a file each
+    #[arg(long, value_name = "FILE.glb")]
+    pub region: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct Cones {
+    #[command(flatten)]
+    pub inputs: Inputs,
+    /// Folder for the results [default: output.folder of the configuration, or affine-atlas-out]
+    #[arg(short, long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Numbers of cones to try [default: 0,4,8,16,32, as far as the surface allows]
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
+    pub counts: Option<Vec<u32>>,
+    /// Write one JSON array instead of tables
+    #[arg(long)]
+    pub json: bool,
 }
 
 #[derive(Debug, Args)]

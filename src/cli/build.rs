@@ -14,7 +14,7 @@ use std::time::Instant;
 /// Builds every asset, shows what became of each, and gives the exit code.
 pub fn run(build: &Build, global: &Global, work: &Work) -> Result<u8, Problem> {
     let plan = plan(&build.inputs, build.out.as_deref())?;
-    plan.keep_inputs()?;
+    plan.keep_inputs(|asset| plan.folder(asset))?;
     start_threads(global.threads, &plan.config)?;
     let announce = !global.quiet && global.log_format == LogFormat::Text;
     interrupt::install(work.remove_staging, announce);
@@ -68,7 +68,7 @@ fn build_one(plan: &Plan, asset: &Asset, observer: &dyn Observer, work: &Work) -
 }
 
 /// The worst that happened.
-fn exit_code(outcomes: &[AssetOutcome]) -> u8 {
+pub(super) fn exit_code(outcomes: &[AssetOutcome]) -> u8 {
     let any = |test: &dyn Fn(&AssetOutcome) -> bool| outcomes.iter().any(test);
     if any(&|outcome| outcome.state == AssetState::Cancelled) {
         exit::INTERRUPTED
@@ -88,6 +88,7 @@ fn exit_code(outcomes: &[AssetOutcome]) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cli::work::Surveyed;
     use affine_atlas::config::Config;
     use affine_atlas::outcome::ComponentOutcome;
     use std::path::{Path, PathBuf};
@@ -128,6 +129,13 @@ mod tests {
                 message: String::new(),
             })
         },
+        survey: |request, _| Surveyed {
+            text: String::new(),
+            json: None,
+            suggested: None,
+            outcome: built(&request.asset.id),
+        },
+        survey_folder: str::to_owned,
         verify: |_| {
             Err(Failure {
                 kind: FailureKind::Input,

@@ -7,6 +7,8 @@ use super::work::Work;
 use super::{exit, panics, terminal};
 use affine_atlas::outcome::{Failure, FailureKind};
 use console::style;
+use std::io::Write;
+use std::path::Path;
 
 /// Says for every asset what a build would do. Exit code 1 where one would be refused.
 pub fn run(check: &Check, global: &Global, work: &Work) -> Result<u8, Problem> {
@@ -30,6 +32,16 @@ pub fn run(check: &Check, global: &Global, work: &Work) -> Result<u8, Problem> {
                     let heading = style(format!("{} ({})", asset.id, asset.path.display())).bold();
                     terminal::print(&format!("{heading}\n{}\n", inspection.text.trim_end()));
                 }
+                if let Some(path) = &check.region {
+                    let path = match plan.assets.len() {
+                        1 => path.clone(),
+                        _ => path.with_file_name(one_of_many(path, &asset.id)),
+                    };
+                    let said = write_region(&path, inspection.region.as_deref())?;
+                    if !global.quiet {
+                        terminal::print(&format!("  {said}\n"));
+                    }
+                }
             }
             Err(failure) => {
                 code = code.max(match failure.kind {
@@ -41,6 +53,41 @@ pub fn run(check: &Check, global: &Global, work: &Work) -> Result<u8, Problem> {
         }
     }
     Ok(code)
+}
+
+/// `region.glb` and `bunny`: `region-bunny.glb`.
+fn one_of_many(path: &Path, id: &str) -> String {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    match extension.is_empty() {
+        true => format!("{stem}-{id}"),
+        false => format!("{stem}-{id}.{extension}"),
+    }
+}
+
+/// Writes the region's GLB, complete or not at all, where there is one; says which.
+fn write_region(path: &Path, glb: Option<&[u8]>) -> Result<String, Problem> {
+    let Some(glb) = glb else {
+        return Ok(format!(
+            "region: none to show, {} was not written",
+            path.display()
+        ));
+    };
+    let not_written = |reason: std::io::Error| Problem::NotWritten {
+        path: path.to_owned(),
+        reason: reason.kind().to_string(),
+    };
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let mut file = super::init::builder()
+        .tempfile_in(folder)
+        .map_err(not_written)?;
+    file.write_all(glb).map_err(not_written)?;
+    file.persist(path)
+        .map_err(|error| not_written(error.error))?;
+    Ok(format!("region: written to {}", path.display()))
 }
 
 /// One line on standard error.

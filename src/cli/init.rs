@@ -60,7 +60,7 @@ fn write(path: &Path, force: bool) -> Result<(), Problem> {
 
 /// Temporary files are private to their user; this one becomes an ordinary file.
 #[cfg(unix)]
-fn builder() -> tempfile::Builder<'static, 'static> {
+pub(super) fn builder() -> tempfile::Builder<'static, 'static> {
     use std::os::unix::fs::PermissionsExt;
     let mut builder = tempfile::Builder::new();
     builder.permissions(std::fs::Permissions::from_mode(0o666)); // minus the user's umask
@@ -68,6 +68,6 @@ fn builder() -> tempfile::Builder<'static, 'static> {
 }
 
 #[cfg(not(unix))]
-fn builder() -> tempfile::Builder<'static, 'static> {
+pub(super) fn builder() -> tempfile::Builder<'static, 'static> {
     tempfile::Builder::new()
 }

@@ -3,6 +3,7 @@
 mod arguments;
 mod build;
 mod check;
+mod cones;
 mod init;
 mod interrupt;
 mod log;
@@ -64,6 +65,7 @@ fn run(arguments: &Arguments, work: &Work) -> Result<u8, Problem> {
     match &arguments.command {
         Command::Build(build) => build::run(build, global, work),
         Command::Check(check) => check::run(check, global, work),
+        Command::Cones(cones) => cones::run(cones, global, work),
         Command::Verify(verify) => verify::run(verify, global, work),
         Command::Init(init) => init::run(init, global),
     }

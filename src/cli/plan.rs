@@ -3,7 +3,7 @@
 use super::arguments::Inputs;
 use super::problem::Problem;
 use affine_atlas::config::assets::{Asset, name_assets};
-use affine_atlas::config::{self, Config, Loaded};
+use affine_atlas::config::{self, Config};
 use std::path::{Path, PathBuf};
 
 /// What is to be done.
@@ -39,11 +39,7 @@ pub fn plan(inputs: &Inputs, out: Option<&Path>) -> Result<Plan, Problem> {
     };
     let mut loaded = match file {
         Some(file) => config::load(file, &inputs.set)?,
-        None => Loaded {
-            config: config::parse("defaults", "", &inputs.set)?,
-            input_base: PathBuf::new(),
-            output_base: PathBuf::new(),
-        },
+        None => config::defaults(&inputs.set)?,
     };
     if !meshes.is_empty() {
         loaded.config.input.paths = meshes.into_iter().cloned().collect();
@@ -78,8 +74,9 @@ impl Plan {
 
     /// Refuses a plan in which an asset's folder, which is replaced as a whole, holds an input:
     /// `build spot/spot.obj --out .` must not delete `spot/spot.obj`.
-    pub fn keep_inputs(&self) -> Result<(), Problem> {
-        for folder in self.assets.iter().map(|asset| self.folder(asset)) {
+    /// `folder` is that of an asset.
+    pub fn keep_inputs(&self, folder: impl Fn(&Asset) -> PathBuf) -> Result<(), Problem> {
+        for folder in self.assets.iter().map(folder) {
             let Ok(real) = folder.canonicalize() else {
                 continue; // Does not exist, so nothing is in it.
             };
@@ -171,10 +168,12 @@ mod tests {
         std::fs::write(&mesh, "").expect("written");
         let inside = plan(&inputs(&[&mesh], &[]), Some(folder.path())).expect("planned");
         assert!(matches!(
-            inside.keep_inputs(),
+            inside.keep_inputs(|asset| inside.folder(asset)),
             Err(Problem::OverwritesInput { .. })
         ));
         let beside = plan(&inputs(&[&mesh], &[]), Some(&inner)).expect("planned");
-        beside.keep_inputs().expect("spot/spot does not exist");
+        beside
+            .keep_inputs(|asset| beside.folder(asset))
+            .expect("spot/spot does not exist");
     }
 }

@@ -13,6 +13,8 @@ use std::time::Duration;
 pub struct Progress {
     style: Style,
     assets: usize,
+    /// What is said of an asset that is done.
+    done: &'static str,
 }
 
 enum Style {
@@ -36,7 +38,16 @@ impl Progress {
                 steps: global.verbose > 0,
             }
         };
-        Self { style, assets }
+        Self {
+            style,
+            assets,
+            done: "built",
+        }
+    }
+
+    /// With another word than "built" for assets that are done.
+    pub fn calling_it(self, done: &'static str) -> Self {
+        Self { done, ..self }
     }
 
     /// Watches one asset, `index` from 0.
@@ -63,7 +74,10 @@ impl Progress {
                 index + 1,
                 self.assets,
                 outcome.id,
-                outcome.state_name(),
+                match outcome.state_name() {
+                    "built" => self.done,
+                    other => other,
+                },
                 outcome.seconds
             )),
             Style::Json => summary::log(outcome),

@@ -14,6 +14,11 @@ pub struct Work {
     pub record: fn(&Path, &Config, &[AssetOutcome]) -> Result<(), Failure>,
     /// Says what a build would do, without building.
     pub inspect: fn(&Asset, &Config) -> Result<Inspection, Failure>,
+    /// Flattens one asset with different numbers of cones and writes what came of it into a folder below the output folder
+    /// given.
+    pub survey: fn(&SurveyRequest<'_>, &dyn Observer) -> Surveyed,
+    /// Name of that folder for an asset's id.
+    pub survey_folder: fn(&str) -> String,
     /// Reads an output folder back and checks it.
     pub verify: fn(&VerifyRequest) -> Result<VerifyResult, Failure>,
     /// Removes folders that are being written. Called once before the program is stopped.
@@ -26,6 +31,32 @@ pub struct Inspection {
     pub text: String,
     /// Whether a build would be refused for what is known already.
     pub refused: bool,
+    /// A GLB of the regions for which no circle packing exists, where there are any.
+    pub region: Option<Vec<u8>>,
+}
+
+/// What `cones` is asked for one asset.
+pub struct SurveyRequest<'a> {
+    /// The asset.
+    pub asset: &'a Asset,
+    /// The output folder.
+    pub output: &'a Path,
+    /// The effective configuration.
+    pub config: &'a Config,
+    /// Numbers of cones, where the arguments name them.
+    pub counts: Option<&'a [usize]>,
+}
+
+/// What `cones` says of one asset.
+pub struct Surveyed {
+    /// Topology, table and suggestion: lines for a reader. Empty where nothing could be tried.
+    pub text: String,
+    /// The same for programs.
+    pub json: Option<serde_json::Value>,
+    /// Configuration of the suggested number of cones, in the folder that was written.
+    pub suggested: Option<String>,
+    /// What became of the asset.
+    pub outcome: AssetOutcome,
 }
 
 /// What `verify` is asked for one folder.

@@ -2,6 +2,7 @@
 
 use super::error::{ConfigError, Location};
 use super::keys::{self, Kind};
+use crate::flow::cones::PiMultiple;
 use std::ops::Range;
 use std::sync::Arc;
 use toml::Spanned;
@@ -107,8 +108,16 @@ fn check_value(
                 errors.push(out_of_range(given.as_str()));
             }
         }
+        (Kind::CurvatureIn { min, below }, DeValue::String(given)) => {
+            // A text that is no curvature is left to the type, which says what is wrong with it.
+            if let Ok(curvature) = given.parse::<PiMultiple>()
+                && !(min..below).contains(&curvature.multiple())
+            {
+                errors.push(out_of_range(&format!("{given:?}")));
+            }
+        }
         (
-            Kind::Number { .. } | Kind::ZeroOr { .. } | Kind::Curvature,
+            Kind::Number { .. } | Kind::ZeroOr { .. } | Kind::Curvature | Kind::CurvatureIn { .. },
             given @ (DeValue::Integer(_) | DeValue::Float(_)),
         ) => {
             // NaN and infinities are in no range.
@@ -116,6 +125,9 @@ fn check_value(
                 (Kind::Number { min, max }, Some(x)) => (min <= x && x <= max, kind.to_string()),
                 (Kind::ZeroOr { min, max }, Some(x)) => {
                     (x == 0.0 || (min <= x && x <= max), kind.to_string())
+                }
+                (Kind::CurvatureIn { min, below }, Some(x)) => {
+                    ((min..below).contains(&x), kind.to_string())
                 }
                 // Any multiple of π; the stage compares it with Gauss–Bonnet.
                 (_, x) => (x.is_some_and(f64::is_finite), "a finite number".to_owned()),

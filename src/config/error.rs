@@ -166,6 +166,25 @@ pub enum ConfigError {
         /// What the key takes.
         allowed: String,
     },
+    /// `cones.file` cannot be read.
+    #[error("the cone file {} cannot be read: {reason}", path.display())]
+    NoConeFile {
+        /// Relative to the current folder or absolute.
+        path: PathBuf,
+        /// What the system said.
+        reason: String,
+    },
+    /// A line of `cones.file` that is no cone.
+    #[error("{at}: {reason}")]
+    ConeLine {
+        /// Where.
+        at: Box<Location>,
+        /// Why.
+        reason: String,
+    },
+    /// Both ways of naming cones.
+    #[error("`cones.list` and `cones.file` both name cones")]
+    ListAndFile,
     /// A value that the stage itself refuses.
     #[error("{at}: `{key}` is not usable: {reason}")]
     Refused {
@@ -186,8 +205,11 @@ impl ConfigError {
             Self::NotFound { .. }
             | Self::Unreadable { .. }
             | Self::TooLong { .. }
+            | Self::NoConeFile { .. }
+            | Self::ListAndFile
             | Self::OverrideWithoutValue { .. } => None,
             Self::Syntax { at, .. }
+            | Self::ConeLine { at, .. }
             | Self::UnknownKey { at, .. }
             | Self::WrongType { at, .. }
             | Self::UnknownChoice { at, .. }
@@ -213,6 +235,13 @@ impl ConfigError {
                 "write `--set section.key=value`, for example `--set flow.scheme=thurston`"
                     .to_owned()
             }
+            Self::NoConeFile { .. } => "`cones.file` starts at the configuration's folder (with \
+                 `--set` at the current one); check the name and that it is UTF-8 text"
+                .to_owned(),
+            Self::ConeLine { .. } => "each line holds the number of a vertex and its curvature in \
+                 radians, for example `17 1.570796`; `cones.file_first_vertex` says where numbers begin"
+                .to_owned(),
+            Self::ListAndFile => "remove one of them".to_owned(),
             Self::Syntax { .. } => {
                 "texts need quotes, lists need [ ], and each key stands once, on its own line"
                     .to_owned()

@@ -40,6 +40,13 @@ pub enum Kind {
     Texts,
     /// A curvature in multiples of π: a number, or a fraction as text.
     Curvature,
+    /// The same, held to a range of multiples of π.
+    CurvatureIn {
+        /// Least value.
+        min: f64,
+        /// What every value lies below.
+        below: f64,
+    },
     /// A list of curvatures.
     Curvatures,
     /// Three coordinates.
@@ -69,6 +76,10 @@ impl fmt::Display for Kind {
             Self::Text => write!(f, "a text in quotes"),
             Self::Texts => write!(f, "a list of texts in quotes"),
             Self::Curvature => write!(f, "a number or a fraction such as \"1/2\""),
+            Self::CurvatureIn { min, below } => write!(
+                f,
+                "a number or a fraction such as \"1/2\", from {min} to below {below}"
+            ),
             Self::Curvatures => {
                 write!(
                     f,
@@ -204,6 +215,13 @@ pub const KEYS: &[Key] = &[
         "multiples of π",
         "required",
     ),
+    key("cones.file", Kind::Text, "", "absent"),
+    key(
+        "cones.file_first_vertex",
+        Kind::Integer { min: 0, max: 1 },
+        "",
+        "0",
+    ),
     key(
         "cones.count",
         Kind::Integer {
@@ -212,6 +230,54 @@ pub const KEYS: &[Key] = &[
         },
         "cones",
         "8",
+    ),
+    key(
+        "cones.log_scale_bound",
+        Kind::Number {
+            min: 0.01,
+            max: 50.0,
+        },
+        "natural logarithms of length",
+        "absent",
+    ),
+    key(
+        "cones.objective",
+        Kind::Choice(&["log-scale", "area-distortion"]),
+        "",
+        "\"log-scale\"",
+    ),
+    key(
+        "cones.quantum",
+        Kind::CurvatureIn {
+            min: 0.0,
+            below: 2.0,
+        },
+        "multiples of π",
+        "0",
+    ),
+    key(
+        "cones.min_curvature",
+        Kind::CurvatureIn {
+            min: -100.0,
+            below: 0.0,
+        },
+        "multiples of π",
+        "-4",
+    ),
+    key(
+        "cones.max_curvature",
+        Kind::CurvatureIn {
+            min: 0.0,
+            below: 2.0,
+        },
+        "multiples of π",
+        "\"3/2\"",
+    ),
+    key(
+        "cones.boundary_distance",
+        Kind::Number { min: 0.0, max: 1.0 },
+        "square roots of the component's area",
+        "0.0",
     ),
     key(
         "cones.curvature",

@@ -1,8 +1,9 @@
-//! From text and overrides to a [`Config`].
+//! From text and overrides to a [`Config`], cones of a cone file included.
 
 use super::Config;
 use super::check::{Source, check};
-use super::error::ConfigError;
+use super::error::{ConfigError, Location};
+use crate::flow::cones;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -40,7 +41,7 @@ impl Loaded {
 pub fn load(path: &Path, overrides: &[String]) -> Result<Loaded, ConfigError> {
     let text = read_text(path)?;
     let base = path.parent().unwrap_or(Path::new("")).to_owned();
-    let config = parse(&path.display().to_string(), &text, overrides)?;
+    let mut config = parse(&path.display().to_string(), &text, overrides)?;
     let set = |key: &str| overrides.iter().any(|given| override_key(given) == key);
     let base_of = |key: &str| {
         if set(key) {
@@ -49,6 +50,7 @@ pub fn load(path: &Path, overrides: &[String]) -> Result<Loaded, ConfigError> {
             base.clone()
         }
     };
+    read_cones(&mut config, &base_of("cones.file"))?;
     Ok(Loaded {
         input_base: base_of("input.paths"),
         output_base: base_of("output.folder"),
@@ -56,7 +58,54 @@ pub fn load(path: &Path, overrides: &[String]) -> Result<Loaded, ConfigError> {
     })
 }
 
-/// Parses a configuration text; `name` is what errors call it. An empty text gives the defaults.
+/// The defaults with overrides; every relative path starts at the current folder.
+///
+/// # Errors
+/// As [`load`], but for those of reading a configuration file.
+pub fn defaults(overrides: &[String]) -> Result<Loaded, ConfigError> {
+    let mut config = parse("defaults", "", overrides)?;
+    read_cones(&mut config, Path::new(""))?;
+    Ok(Loaded {
+        input_base: PathBuf::new(),
+        output_base: PathBuf::new(),
+        config,
+    })
+}
+
+/// Puts the cones of `cones.file` into `cones.list`, from where on they are like any others. `base` is what a relative
+/// path starts from.
+fn read_cones(config: &mut Config, base: &Path) -> Result<(), ConfigError> {
+    let params = &mut config.cones;
+    let Some(given) = &params.file else {
+        return Ok(());
+    };
+    if !params.list.is_empty() {
+        return Err(ConfigError::ListAndFile);
+    }
+    let path = base.join(given);
+    let text = read_text(&path).map_err(|error| ConfigError::NoConeFile {
+        reason: match error {
+            ConfigError::NotFound { .. } => "there is no such file".to_owned(),
+            ConfigError::TooLong { bytes, limit, .. } => {
+                format!("it has {bytes} bytes, but a cone file has at most {limit}")
+            }
+            ConfigError::Unreadable { reason, .. } => reason,
+            other => other.to_string(),
+        },
+        path: path.clone(),
+    })?;
+    let cones = cones::file::parse(&text, params.file_first_vertex).map_err(|error| {
+        let at = Location::new(&path.display().to_string(), &Arc::from(text), error.span);
+        ConfigError::ConeLine {
+            at: Box::new(at),
+            reason: error.reason,
+        }
+    })?;
+    (params.file_lines, params.list) = cones.into_iter().unzip();
+    Ok(())
+}
+
+/// Parses a configuration text; `name` is what errors call it. An empty text gives the defaults. A cone file is not read.
 ///
 /// # Errors
 /// As [`load`], but for those of reading a file.

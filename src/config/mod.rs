@@ -16,10 +16,11 @@ mod load;
 mod sections;
 
 pub use error::{ConfigError, Location};
-pub use load::{Loaded, load, parse};
+pub use load::{Loaded, defaults, load, parse};
 pub use sections::*;
 
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 
 /// The commented configuration that `affine-atlas init` writes. It parses to
 /// [`Config::default`] but for `input.paths`.
@@ -55,10 +56,17 @@ pub struct Config {
 
 impl Config {
     /// The effective configuration without what cannot change an output byte of one asset: the
-    /// list of inputs, the output folder and the number of threads.
+    /// list of inputs, the output folder, the number of threads, and where the cones were read from once they are in the list.
     #[must_use]
     pub fn canonical(&self) -> Self {
+        let mut cones = self.cones.clone();
+        if cones.file.is_some() && !cones.list.is_empty() {
+            // That it was a file matters: its curvatures count as rounded.
+            cones.file = Some(PathBuf::new());
+            cones.file_first_vertex = 0;
+        }
         Self {
+            cones,
             input: InputParams::default(),
             output: OutputParams::default(),
             run: RunParams::default(),

@@ -180,6 +180,17 @@ fn bounds_are_accepted_and_beyond_is_refused() {
                     "99999999999999999999".to_owned(),
                 ],
             ),
+            Kind::CurvatureIn { min, below } => (
+                vec![format!("{min:?}"), format!("{}/1000", 1000.0 * below - 1.0)],
+                vec![
+                    format!("{below:?}"),
+                    format!("{below}"),
+                    format!("\"{below}\""),
+                    format!("{}/1000", 1000.0 * min - 1.0),
+                    "nan".to_owned(),
+                    "inf".to_owned(),
+                ],
+            ),
             Kind::Number { min, max } | Kind::ZeroOr { min, max } => (
                 vec![format!("{min:?}"), format!("{max:?}")],
                 vec![
@@ -445,4 +456,75 @@ fn unreadable_files_are_refused() {
         error.to_string().ends_with("byte 1 is not UTF-8 text"),
         "{error}"
     );
+}
+
+/// A folder with a configuration and a file of cones beside it.
+fn with_cone_file(cones: &str, keys: &str) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("my.toml");
+    std::fs::write(&file, format!("[cones]\nfile = \"my.cones.txt\"\n{keys}\n")).expect("written");
+    std::fs::write(folder.path().join("my.cones.txt"), cones).expect("written");
+    (folder, file)
+}
+
+#[test]
+fn a_cone_file_becomes_the_list() {
+    let (folder, file) = with_cone_file("# mine\n3 1.57\n\n9 0.5\n", "file_first_vertex = 1");
+    let loaded = load(&file, &[]).expect("loads");
+    let cones = &loaded.config.cones;
+    let listed: Vec<_> = (cones.list.iter())
+        .map(|c| (c.vertex, c.curvature.radians()))
+        .collect();
+    assert_eq!(listed, [(Some(2), 1.57), (Some(8), 0.5)]);
+    assert_eq!(cones.file_lines, [2, 4]);
+    // An override starts at the current folder.
+    let there = folder.path().join("my.cones.txt");
+    let set = [
+        format!("cones.file={}", there.display()),
+        "cones.file_first_vertex=1".to_owned(),
+    ];
+    assert_eq!(defaults(&set).expect("loads").config.cones.list, cones.list);
+    assert!(matches!(
+        load(&file, &["cones.file=my.cones.txt".to_owned()]),
+        Err(ConfigError::NoConeFile { .. })
+    ));
+}
+
+#[test]
+fn hash_depends_on_what_a_cone_file_says_and_not_on_how() {
+    let hash = |cones: &str, keys: &str| {
+        let (_folder, file) = with_cone_file(cones, keys);
+        load(&file, &[]).expect("loads").config.hash()
+    };
+    let one = hash("3 1.57\n9 0.5\n", "");
+    assert_eq!(one, hash("# same\n 3  1.57e0\n\n9 5e-1", ""));
+    assert_eq!(one, hash("4 1.57\n10 0.5\n", "file_first_vertex = 1"));
+    assert_ne!(one, hash("3 1.57\n9 0.50000000000000011\n", ""));
+    assert_ne!(one, hash("4 1.57\n9 0.5\n", ""));
+    assert_ne!(one, Config::default().hash());
+}
+
+#[test]
+fn cone_files_that_are_refused() {
+    let refused = |cones: &str, keys: &str| {
+        let (_folder, file) = with_cone_file(cones, keys);
+        load(&file, &[]).expect_err(cones)
+    };
+    let error = refused("3 1.57\n9 half\n", "");
+    let at = error.location().expect("in the cone file");
+    assert_eq!((at.line, at.column, at.offending()), (2, 3, "half"));
+    assert!(error.remedy().contains("17 1.570796"), "{}", error.remedy());
+    let error = refused("3 1.57\n", "list = [{ vertex = 0, curvature = 1 }]");
+    assert_eq!(error, ConfigError::ListAndFile);
+    let (folder, file) = with_cone_file("", "");
+    std::fs::remove_file(folder.path().join("my.cones.txt")).expect("removed");
+    let error = load(&file, &[]).expect_err("missing");
+    let text = error.to_string();
+    assert!(
+        text.ends_with("my.cones.txt cannot be read: there is no such file"),
+        "{text}"
+    );
+    std::fs::write(folder.path().join("my.cones.txt"), [b'3', 0xff]).expect("written");
+    let text = load(&file, &[]).expect_err("no UTF-8").to_string();
+    assert!(text.ends_with("byte 1 is not UTF-8 text"), "{text}");
 }

@@ -22,6 +22,7 @@
 mod auto;
 mod boundary;
 mod error;
+pub mod file;
 mod pi_multiple;
 mod request;
 mod spread;
@@ -40,6 +41,8 @@ use std::path::PathBuf;
 /// Largest miss of Gauss–Bonnet, radians, that counts as rounding of what the user wrote; it is then shared out
 /// among the cones.
 const GAUSS_BONNET_TOLERANCE: f64 = 1e-9;
+/// The same for each cone of a file of another program, whose curvatures are rounded to few digits, radians.
+const ROUNDING_OF_TEXT: f64 = 1e-4;
 
 /// What happens on the boundary loops.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -158,9 +161,12 @@ pub struct ConeParams {
     pub max_curvature: PiMultiple,
     /// For `auto`: least distance of a cone to the boundary, in square roots of the component's area.
     pub boundary_distance: f64,
-    /// File with cones, one a line: vertex and curvature in radians.
+    /// File with cones, one a line: vertex and curvature in radians. [`crate::config::load`] puts them into `list`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
+    /// The line of `file` that each cone of `list` stands on; empty where none was read.
+    #[serde(skip)]
+    pub file_lines: Vec<u32>,
     /// Number of the first vertex in `file`: 0 or 1.
     pub file_first_vertex: u32,
     /// K̄ of each cone for `spread`, in multiples of π; absent: what Gauss–Bonnet leaves, in equal parts.
@@ -184,6 +190,7 @@ impl Default for ConeParams {
             max_curvature: PiMultiple::literal(3, 2),
             boundary_distance: 0.0,
             file: None,
+            file_lines: Vec::new(),
             file_first_vertex: 0,
             curvature: None,
             vertex: None,
@@ -311,7 +318,11 @@ pub fn prescribe(
         &mut target,
     )?;
     check_angles(mesh, &target)?;
-    check_total(mesh, &topology, condition, &mut target)?;
+    let rounding = match (&cones.file, requests.cones.len()) {
+        (Some(_), count) if count > 0 => ROUNDING_OF_TEXT * count as f64,
+        _ => GAUSS_BONNET_TOLERANCE,
+    };
+    check_total(mesh, &topology, condition, rounding, &mut target)?;
     Ok(Prescription::new(target, condition))
 }
 
@@ -427,11 +438,12 @@ fn check_angles(mesh: &Mesh, target: &VertexVec<f64>) -> Result<(), ConeError> {
     Ok(())
 }
 
-/// Gauss–Bonnet (5), or its counterpart for a free boundary.
+/// Gauss–Bonnet (5), or its counterpart for a free boundary. What misses it by at most `tolerance`, radians, is shared out.
 fn check_total(
     mesh: &Mesh,
     topology: &Topology,
     condition: BoundaryCondition,
+    tolerance: f64,
     target: &mut VertexVec<f64>,
 ) -> Result<(), ConeError> {
     let chi = topology.euler_characteristic;
@@ -465,7 +477,7 @@ fn check_total(
     if topology.boundary_loops == 0 && chi == 2 && cones < 3 {
         return Err(ConeError::TooFewOnSphere { cones });
     }
-    if (given - required).abs() > GAUSS_BONNET_TOLERANCE {
+    if (given - required).abs() > tolerance {
         return Err(ConeError::GaussBonnet {
             given,
             required,
@@ -477,6 +489,11 @@ fn check_total(
     // Rounding of the sum itself is no miss: what was written exactly stays exact.
     let rounding = 1e-15 * (1.0 + target.iter().map(|k| k.abs()).sum::<f64>());
     if cones > 0 && (required - given).abs() > rounding {
+        if (required - given).abs() > GAUSS_BONNET_TOLERANCE {
+            tracing::warn!(
+                "the curvatures of cones.file sum to {given:.9} rad instead of {required:.9}, as far off as rounding of their text can be: shared out among {cones} cones"
+            );
+        }
         let share = (required - given) / cones as f64;
         for k in target.as_mut_slice().iter_mut().filter(|k| **k != 0.0) {
             *k += share;

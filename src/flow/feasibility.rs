@@ -16,7 +16,7 @@
 //!
 //! h is what the corners of a face can hold together when each holds at most π − Φ(opposite edge) and all
 //! three π; for two this is π *because* Φ ≤ π/2. So (6) asks whether every vertex can hand its cone angle out to its corners,
-//! and by max-flow min-cut one maximum flow decides it for all sets at once:
+//! and by max-flow min-cut one maximum flow decides it for all sets at once (`network`):
 //!
 //! ```text
 //! source ── Θ_i ── vertex i ── π − Φ(opposite edge) ── face ── π ── sink
@@ -35,74 +35,106 @@
 //! left one. Submodularity needs corners of at least ρπ/2, so the margin shrinks where π − Φ is less, and is none
 //! at Φ = π/2; a packing that fits with a margin fits without.
 //!
-//! *Guaranteed:* in exact arithmetic, (6) decided. *In float64:* arcs with less than [`ROOM`] left count as full, so a region
-//! whose slack is below [`ROOM`] times its corners is taken for one without.
+//! # Exact
+//!
+//! All of it is counted in integers, as multiples of a small fraction of π; `exact` tells which multiples the doubles stand
+//! for, and why no sum overflows. So (6) with equality, a −4π cone at valence 6 with Φ ≡ 0, is found out as surely as a deficit.
+//! Floating point serves only to start the flow where it nearly ends.
+//!
+//! *Guaranteed:* the verdict, for those numbers, with totals that meet Gauss–Bonnet; a region that is returned breaks (6), and no set has
+//! less slack than the regions together. *Not guaranteed:* that float64 can hold a packing that exists: circles around a
+//! region with little slack differ in size by about its inverse.
 
 mod angles;
 mod constraint;
+mod exact;
+mod network;
 #[cfg(test)]
 mod tests;
 mod transport;
 
 pub use constraint::{Constraint, Region, Side, Slack};
 
+use crate::flow::cones::in_pi;
 use crate::geometry::ids::VertexId;
+use std::f64::consts::PI;
 use std::fmt;
 
-/// Angle, radians, that counts as nothing left, one corner: (6) is strict, rounding of its sums stays far below this,
-/// and circles that would have to realise less differ in size by its inverse.
-pub const ROOM: f64 = 1e-10;
-
 /// A set of vertices for which no circle packing exists.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Violation {
     /// A vertex of the set: the one with the strongest curvature of the wrong sign.
     pub vertex: VertexId,
     /// Number of vertices in the set.
     pub size: usize,
+    /// The set, ascending.
+    pub vertices: Vec<VertexId>,
     /// Which way it fails.
     pub side: Side,
     /// Prescribed curvature of the set, radians.
     pub curvature: f64,
     /// What it must exceed ([`Side::Below`]) or stay under ([`Side::Above`]), radians.
     pub bound: f64,
+    /// Minus what is missing, radians; 0 exactly where both sides are equal.
+    pub slack: f64,
+}
+
+/// Most vertices of a region that a message lists.
+const LISTED: usize = 8;
+
+impl Violation {
+    /// Both sides of (6), without what follows from it.
+    pub fn inequality(&self) -> String {
+        let vertex = self.vertex;
+        let set = match self.size {
+            0 | 1 => format!("vertex {vertex}"),
+            size => {
+                let listed: Vec<String> = (self.vertices.iter().take(LISTED))
+                    .map(VertexId::to_string)
+                    .collect();
+                let more = if self.vertices.len() > LISTED {
+                    ", …"
+                } else {
+                    ""
+                };
+                let listed = listed.join(", ");
+                format!("the region of {size} vertices around vertex {vertex} ({listed}{more})")
+            }
+        };
+        let (relation, too) = match self.side {
+            Side::Below => ("more", "little"),
+            Side::Above => ("less", "much"),
+        };
+        let (bound, given) = (in_pi(self.bound), in_pi(self.curvature));
+        let prescribed = match self.slack == 0.0 {
+            true => "exactly that is prescribed".to_owned(),
+            false if bound == given => {
+                format!("{given} is prescribed, {:.1e}π too {too}", -self.slack / PI)
+            }
+            false => format!("{given} is prescribed"),
+        };
+        format!("{set} must have {relation} than {bound} of curvature by (6), but {prescribed}")
+    }
 }
 
 impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let vertex = self.vertex;
-        match self.size {
-            0 | 1 => write!(f, "no circle packing exists: vertex {vertex}")?,
-            size => write!(
-                f,
-                "no circle packing exists: the region of {size} vertices around vertex {vertex}"
-            )?,
-        }
-        let relation = match self.side {
-            Side::Below => "more",
-            Side::Above => "less",
-        };
         write!(
             f,
-            " must have {relation} than {:.9} of curvature by (6), but {:.9} is prescribed (radians); raise the valence there by connectivity repair, move the cones, or use the scheme `vertex-scaling` with flow.delaunay = true",
-            self.bound, self.curvature
+            "no circle packing exists: {}; let connectivity repair split edges there (connectivity.enabled = true), move the cones, or use the scheme `vertex-scaling` with flow.delaunay = true",
+            self.inequality()
         )
     }
 }
 
 impl std::error::Error for Violation {}
 
-/// Decides (6). Where it fails, the error names the first single vertex that breaks it, else the worst region.
-/// For the meaning of (6) itself the margin must be 1.
+/// Decides (6). Where it fails, the error is the worst region. For the meaning of (6) itself the margin must be 1.
 pub fn check(constraint: &mut Constraint) -> Result<(), Violation> {
-    let single = constraint.first_offending_vertex();
-    let region = single.or_else(|| {
-        // The worst; of equals the first.
-        let regions = constraint.offending_regions().into_iter();
-        regions.min_by(|a, b| a.slack.total_cmp(&b.slack))
-    });
-    match region {
-        Some(region) => Err(constraint.violation(&region)),
+    // The worst; of equals the first.
+    let regions = constraint.offending_regions().into_iter();
+    match regions.min_by(|a, b| a.slack.total_cmp(&b.slack)) {
+        Some(region) => Err(constraint.violation(region)),
         None => Ok(()),
     }
 }

@@ -16,9 +16,6 @@
 //!    Raising the cone's valence alone is not enough: a −12π cone needs more than 14 edges around *every* disk.
 //! 2. **Vertices in the first rings** (`rings`): valence ≥ 6 (`ring_valence`), but for other cones and for the boundary.
 //!
-//! 3. **All sets** (`cuts`), where a cone is stronger than −2π: a disk of rings may pass a narrow neck askew, and the
-//!    shortest loop around the neck is what counts. One maximum flow finds the worst set of all; 1.5 D/π edges again.
-//!
 //! On a boundary that is not free every vertex must moreover have angle enough: about 2 − 2K̄/π faces.
 //!
 //! # Operations
@@ -28,7 +25,9 @@
 //! raises v's valence by one; no split lowers any valence, so what holds stays true.
 //! Longest edges go first, which spreads the splits evenly.
 //!
-//! *Not guaranteed:* that (6) then holds for every set: [`make_packable`] decides that, and splits more edges where it fails.
+//! The criteria are for every flow that keeps the connectivity, also where no (6) is known. *Not guaranteed:* that (6) then holds for
+//! every set: a disk of rings may pass a narrow neck askew, and the shortest loop around the neck is what counts. For
+//! circle packings [`make_packable`] decides (6), and splits more edges where it fails, until it holds.
 
 mod cuts;
 mod links;
@@ -38,9 +37,10 @@ mod rings;
 pub use packable::make_packable;
 
 use crate::flow::cones::{BoundaryCondition, Prescription};
+use crate::flow::feasibility::Violation;
 use crate::flow::ricci::FlowParams;
 use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{EdgeId, FaceId, HalfedgeId, VertexId, VertexVec};
+use crate::geometry::ids::{EdgeId, FaceId, HalfedgeId, NONE, VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
 use crate::product::ConnectivityRepair;
 use std::collections::BTreeMap;
@@ -79,7 +79,7 @@ impl Default for RefineParams {
 }
 
 /// Why the criteria were not reached.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RefineError {
     /// A parameter is out of range.
     #[error("connectivity.{key} is {given}, but must be {low} to {high}")]
@@ -93,14 +93,6 @@ pub enum RefineError {
         /// Most allowed.
         high: usize,
     },
-    /// A vertex to raise does not exist.
-    #[error("vertex {vertex} is to be raised, but the mesh has {vertices} vertices")]
-    NoSuchVertex {
-        /// Given.
-        vertex: u32,
-        /// Vertices of the mesh.
-        vertices: usize,
-    },
     /// The bound on splits was reached.
     #[error(
         "{splits} splits did not give the neighbourhoods of the {cones} cones enough edges: set connectivity.rings = {}, spread the curvature over more cones, or refine the mesh there",
@@ -113,6 +105,16 @@ pub enum RefineError {
         cones: usize,
         /// Rings asked for.
         rings: usize,
+    },
+    /// No number of splits that was tried made room for a circle packing.
+    #[error(
+        "no circle packing exists, even after {splits} splits around such regions: {}; spread the curvature over more cones, move them, or use the scheme `vertex-scaling` with flow.delaunay = true", violation.inequality()
+    )]
+    StillInfeasible {
+        /// Splits made.
+        splits: usize,
+        /// The worst region that is left; vertices of the file.
+        violation: Violation,
     },
 }
 
@@ -147,29 +149,26 @@ pub fn refine(
     Ok(editor.finish())
 }
 
-/// Raises each listed vertex to at least the valence beside it, for regions that a test of (6) found wanting.
-/// A new vertex has valence 4; vertices of the list are raised in pairs where they lie across an edge.
-pub fn raise_valence(
-    mesh: Mesh,
-    prescription: Prescription,
-    needed: &[(VertexId, usize)],
-) -> Result<(Mesh, Prescription, ConnectivityRepair), RefineError> {
-    let vertices = mesh.connectivity.vertex_count();
-    if let Some((v, _)) = needed.iter().find(|(v, _)| v.index() >= vertices) {
-        return Err(RefineError::NoSuchVertex {
-            vertex: v.raw(),
-            vertices,
-        });
+/// Number in the file of a vertex, or of one beside it where repair put it in.
+pub(crate) fn source_vertex(mesh: &Mesh, v: VertexId) -> u32 {
+    let around = std::iter::once(v).chain(mesh.connectivity.neighbours(v));
+    let mut known = around.map(|w| mesh.source_vertex[w]).filter(|&s| s != NONE);
+    known.next().unwrap_or(v.raw())
+}
+
+/// The same with the vertices of the file: those that repair put in are left out of the list, but counted.
+pub(crate) fn in_source(violation: Violation, mesh: &Mesh) -> Violation {
+    let named = |v: VertexId| VertexId::new(source_vertex(mesh, v) as usize);
+    let mut vertices: Vec<VertexId> = (violation.vertices.iter())
+        .filter(|&&v| mesh.source_vertex[v] != NONE)
+        .map(|&v| named(v))
+        .collect();
+    vertices.sort_unstable();
+    Violation {
+        vertex: named(violation.vertex),
+        vertices,
+        ..violation
     }
-    let mut wanted: BTreeMap<VertexId, usize> = BTreeMap::new();
-    for &(v, valence) in needed {
-        let entry = wanted.entry(v).or_default();
-        *entry = valence.max(*entry);
-    }
-    let mut editor = Editor::new(mesh, prescription, usize::MAX);
-    // Without a bound on splits this cannot fail: each split raises the vertex by one.
-    let _: Result<(), OutOfSplits> = raise_all(&mut editor, &wanted);
-    Ok(editor.finish())
 }
 
 fn raise_flat_vertices(editor: &mut Editor, valence: usize) -> Result<(), OutOfSplits> {
@@ -268,10 +267,6 @@ impl Editor {
                 links::widen(self, cone, params.rings)?;
             }
             rings::raise(self, params)?;
-            let strong = |&v: &VertexId| self.target[v] < -2.0 * PI - 1e-9;
-            if self.interior_cones().iter().any(strong) {
-                cuts::widen(self)?;
-            }
             if self.splits == before {
                 return Ok(());
             }
@@ -348,9 +343,7 @@ impl Editor {
     /// The result; new vertices on a uniform boundary take their share. Where single boundary vertices are prescribed, they keep
     /// what they have, and the border is straight at a new vertex.
     fn finish(mut self) -> (Mesh, Prescription, ConnectivityRepair) {
-        if self.boundary == BoundaryCondition::Uniform {
-            self.share_uniform_curvature();
-        }
+        self.share_uniform_curvature();
         let repair = ConnectivityRepair {
             splits: self.splits,
             flips: 0,
@@ -360,16 +353,16 @@ impl Editor {
         (self.mesh, prescription, repair)
     }
 
-    /// Every loop keeps its total: its new vertices and those with the loop's most frequent curvature share what the latter had.
+    /// Every loop keeps its total: its new vertices and those with the loop's most frequent curvature share what they have.
+    /// Doing it again changes nothing.
     fn share_uniform_curvature(&mut self) {
+        if self.boundary != BoundaryCondition::Uniform {
+            return;
+        }
         for chain in self.mesh.connectivity.boundary_loops() {
-            let vertices: Vec<VertexId> = chain
-                .iter()
-                .map(|&h| self.mesh.connectivity.tail(h))
-                .collect();
-            let (new, old): (Vec<VertexId>, Vec<VertexId>) = vertices
-                .into_iter()
-                .partition(|v| v.index() >= self.original_vertices);
+            let vertices = chain.iter().map(|&h| self.mesh.connectivity.tail(h));
+            let (new, old): (Vec<VertexId>, Vec<VertexId>) =
+                vertices.partition(|v| v.index() >= self.original_vertices);
             let mut frequency: BTreeMap<u64, usize> = BTreeMap::new();
             for &v in &old {
                 *frequency.entry(self.target[v].to_bits()).or_default() += 1;
@@ -380,11 +373,13 @@ impl Editor {
             let Some((&bits, &count)) = most.filter(|_| !new.is_empty()) else {
                 continue;
             };
-            let share = f64::from_bits(bits) * count as f64 / (count + new.len()) as f64;
-            let sharing = old
+            let held: f64 = new.iter().map(|&v| self.target[v]).sum();
+            let total = f64::from_bits(bits) * count as f64 + held;
+            let share = total / (count + new.len()) as f64;
+            let sharing: Vec<VertexId> = old
                 .into_iter()
                 .filter(|&v| self.target[v].to_bits() == bits)
-                .collect::<Vec<_>>();
+                .collect();
             for v in sharing.into_iter().chain(new) {
                 self.target[v] = share;
             }

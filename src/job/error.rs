@@ -7,10 +7,9 @@ use crate::atlas::overlay::OverlayError;
 use crate::atlas::patches::PatchError;
 use crate::export::ExportError;
 use crate::flow::cones::ConeError;
-use crate::flow::feasibility::Violation;
-use crate::flow::refine::RefineError;
+use crate::flow::refine::{self, RefineError};
 use crate::flow::ricci::FlowError;
-use crate::geometry::ids::{FaceId, NONE, VertexId};
+use crate::geometry::ids::{FaceId, VertexId};
 use crate::geometry::mesh::Mesh;
 use crate::outcome::{Failure, FailureKind};
 use crate::read::ReadError;
@@ -99,12 +98,7 @@ impl BuildError {
 /// The same error with indices of the input file. A vertex that repair put in is named by one of the face it
 /// was put into.
 fn in_source(error: FlowError, mesh: &Mesh) -> FlowError {
-    let c = &mesh.connectivity;
-    let vertex = |v: VertexId| {
-        let around = std::iter::once(v).chain(c.neighbours(v));
-        let known = around.map(|w| mesh.source_vertex[w]).find(|&s| s != NONE);
-        known.map_or(v, |s| VertexId::new(s as usize))
-    };
+    let vertex = |v: VertexId| VertexId::new(refine::source_vertex(mesh, v) as usize);
     let face = |f: FaceId| FaceId::new(mesh.source_face[f] as usize);
     match error {
         FlowError::BadLength {
@@ -125,10 +119,9 @@ fn in_source(error: FlowError, mesh: &Mesh) -> FlowError {
             curvature,
             bound,
         },
-        FlowError::Infeasible(violation) => FlowError::Infeasible(Violation {
-            vertex: vertex(violation.vertex),
-            ..violation
-        }),
+        FlowError::Infeasible(violation) => {
+            FlowError::Infeasible(refine::in_source(violation, mesh))
+        }
         FlowError::NotConverged {
             method,
             iterations,

@@ -1,13 +1,19 @@
 //! What a build would do with an asset, without building it.
 
-use super::{BuildError, refine_for};
+mod existence;
+
+use super::{BuildError, listing, refine_for};
 use crate::config::Config;
+use crate::export::ExportError;
+use crate::export::glb::region::{self, RegionOf};
 use crate::flow::cones::{self, BoundaryCondition, Prescription, in_pi};
+use crate::flow::refine;
 use crate::geometry::mesh::Mesh;
 use crate::outcome::Failure;
 use crate::product::ConnectivityRepair;
 use crate::read;
 use crate::repair::{self, Component};
+use existence::Verdict;
 use std::f64::consts::PI;
 use std::fmt::{self, Write as _};
 use std::path::Path;
@@ -16,12 +22,19 @@ use std::path::Path;
 pub struct Inspection {
     text: String,
     failures: Vec<Failure>,
+    regions: Vec<RegionOf>,
 }
 
 impl Inspection {
     /// Why parts of the asset would be refused, as far as that is known before the flow.
     pub fn failures(&self) -> &[Failure] {
         &self.failures
+    }
+
+    /// A GLB of the components for which no circle packing exists before connectivity repair, each with its worst region in
+    /// colour; `None` where there is none, or where the scheme is no circle packing.
+    pub fn region_glb(&self) -> Option<Result<Vec<u8>, ExportError>> {
+        (!self.regions.is_empty()).then(|| region::encode(&self.regions))
     }
 }
 
@@ -51,7 +64,7 @@ pub fn inspect(path: &Path, config: &Config) -> Result<Inspection, BuildError> {
     for note in &asset.notes {
         line(format!("note: {note}"));
     }
-    let mut failures = Vec::new();
+    let (mut failures, mut regions) = (Vec::new(), Vec::new());
     for (i, (component, requests)) in repaired.components.into_iter().zip(requests).enumerate() {
         if count > 1 {
             line(format!("component {i}:"));
@@ -63,32 +76,65 @@ pub fn inspect(path: &Path, config: &Config) -> Result<Inspection, BuildError> {
             changes.as_str()
         };
         line(format!("  repair: {changes}"));
-        match plan(component, &requests, config) {
-            Ok((mesh, prescription, repair)) => {
-                let repaired = config
-                    .connectivity
-                    .is_enabled(&config.flow)
-                    .then_some(&repair);
-                describe(&mesh, &prescription, repaired, &mut line);
-            }
+        let mut offend = |region| {
+            regions.push(RegionOf {
+                component: i,
+                ..region
+            })
+        };
+        match plan(component, &requests, config, &mut line, &mut offend) {
+            Ok(()) => {}
             Err(error) => {
                 line(format!("  refused: {error}"));
                 failures.push(Failure::from(&error));
             }
         }
     }
-    Ok(Inspection { text, failures })
+    Ok(Inspection {
+        text,
+        failures,
+        regions,
+    })
 }
 
-/// Everything up to the flow.
+/// Everything up to the flow, with a line for each thing worth knowing.
 fn plan(
     component: Component,
     requests: &cones::Requests,
     config: &Config,
-) -> Result<(Mesh, Prescription, ConnectivityRepair), BuildError> {
+    line: &mut impl FnMut(String),
+    offend: &mut impl FnMut(RegionOf),
+) -> Result<(), BuildError> {
     let mesh = component.mesh?;
     let prescription = cones::prescribe(&mesh, requests, &config.cones, &config.boundary)?;
-    Ok(refine_for(config, mesh, prescription)?)
+    let given = existence::decide(&mesh, &prescription, &config.flow)
+        .map_err(|e| BuildError::flow(e, &mesh))?;
+    if let Some(Verdict::Impossible(violation)) = &given {
+        offend(RegionOf {
+            component: 0,
+            mesh: mesh.clone(),
+            violation: violation.clone(),
+        });
+        let violation = refine::in_source(violation.clone(), &mesh);
+        if !config.connectivity.is_enabled(&config.flow) {
+            describe(&mesh, &prescription, None, line);
+            return Err(BuildError::Flow(violation.into()));
+        }
+        let said = violation.inequality();
+        line(format!(
+            "  circle packing: none on the connectivity as given: {said}"
+        ));
+    }
+    let (mesh, prescription, repair) = refine_for(config, mesh, prescription)?;
+    let enabled = config.connectivity.is_enabled(&config.flow);
+    describe(&mesh, &prescription, enabled.then_some(&repair), line);
+    let verdict = match repair.splits {
+        0 => given,
+        _ => existence::decide(&mesh, &prescription, &config.flow)
+            .map_err(|e| BuildError::flow(e, &mesh))?,
+    };
+    line(existence::line(verdict.as_ref(), &mesh, &config.flow));
+    Ok(())
 }
 
 fn describe(
@@ -124,53 +170,12 @@ fn describe(
     } else {
         format!("  Gauss–Bonnet: {required} required, {given} prescribed")
     });
-    if prescription.cones.is_empty() {
-        line("  cones: none".to_owned());
-    }
-    for (inside, curvature, vertices) in by_curvature(mesh, prescription) {
-        let count = match inside {
-            true => counted(vertices.len(), "cone", "cones"),
-            false => counted(vertices.len(), "boundary vertex", "boundary vertices"),
-        };
-        let curvature = in_pi(curvature);
-        line(format!("  {count} of {curvature}: {}", listed(&vertices)));
-    }
-}
-
-/// Vertices of the file that get the same curvature, inside or on the boundary; in the order of the first of each.
-fn by_curvature(mesh: &Mesh, prescription: &Prescription) -> Vec<(bool, f64, Vec<u32>)> {
-    let mut groups: Vec<(bool, f64, Vec<u32>)> = Vec::new();
-    for cone in &prescription.cones {
-        let vertex = mesh.source_vertex[cone.vertex];
-        let inside = !mesh.connectivity.is_boundary_vertex(cone.vertex);
-        let same = |g: &&mut (bool, f64, _)| g.0 == inside && g.1 == cone.curvature;
-        match groups.iter_mut().find(same) {
-            Some((_, _, vertices)) => vertices.push(vertex),
-            None => groups.push((inside, cone.curvature, vec![vertex])),
-        }
-    }
-    groups
-}
-
-/// At most so many vertices stand in one line.
-const LISTED: usize = 12;
-
-/// `at vertices 3, 7 and 9 of the file`.
-fn listed(vertices: &[u32]) -> String {
-    let names: Vec<String> = vertices.iter().map(u32::to_string).collect();
-    match &names[..] {
-        [only] => format!("at vertex {only} of the file"),
-        many if many.len() > LISTED => format!(
-            "at vertices {} … of the file, {} more",
-            many[..LISTED].join(", "),
-            many.len() - LISTED
-        ),
-        [first @ .., last] => format!("at vertices {} and {last} of the file", first.join(", ")),
-        [] => String::new(),
+    for words in listing::cones(mesh, prescription) {
+        line(format!("  {words}"));
     }
 }
 
 /// A count with its noun.
-fn counted(count: usize, one: &str, several: &str) -> String {
+pub(super) fn counted(count: usize, one: &str, several: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { several })
 }

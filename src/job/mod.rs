@@ -1,29 +1,30 @@
 //! The main job: one asset from file to folder.
 //!
-//! `build_component` is the pipeline of the tutorial (5.1) on one page: data only flows forward, and a finished
-//! value is never changed. [`build`] does it for every component of a mesh in memory, [`run`] for a file,
-//! [`inspect`] stops before the flow.
+//! `build_component` is the pipeline of the tutorial (5.1) on one page, its first half on another (`flatten`): data only
+//! flows forward, and a finished value is never changed. [`build`] does it for every component of a mesh in memory, [`run`] for a file,
+//! [`inspect`] stops before the flow, [`survey`] tries different cones.
 
 mod error;
+mod flatten;
 mod inspect;
+mod listing;
+pub mod survey;
 
 pub use error::BuildError;
 pub use inspect::{Inspection, inspect};
 
+use flatten::{Flattened, flatten, refine_for};
+
 use crate::atlas::develop::Development;
-use crate::atlas::overlay::Overlay;
-use crate::atlas::{charts, cut, develop, geometry_image, overlay, patches};
+use crate::atlas::{charts, develop, geometry_image, patches};
 use crate::config::Config;
 use crate::export::folder::{Staging, component_name, list_files};
 use crate::export::{self, ExportError, Provenance, pictures};
-use crate::flow::cones::{self, Prescription, Requests};
-use crate::flow::refine::{self, RefineError};
-use crate::flow::ricci;
-use crate::geometry::ids::EdgeVec;
-use crate::geometry::mesh::{Mesh, Soup};
+use crate::flow::cones::{self, Requests};
+use crate::geometry::mesh::Soup;
 use crate::observe::Observer;
 use crate::outcome::{AssetOutcome, AssetState, ComponentOutcome, Failure, Summary};
-use crate::product::{AffineAtlas, ConnectivityRepair};
+use crate::product::AffineAtlas;
 use crate::read::{self, SourceAsset};
 use crate::repair::{self, Component};
 use crate::report;
@@ -44,16 +45,33 @@ pub fn build(
     let parts = repaired.components.into_iter().zip(requests).enumerate();
     Ok(parts
         .map(|(i, (component, requests))| {
-            let enter = |stage| {
-                if observer.cancelled() {
-                    return Err(BuildError::Cancelled);
-                }
-                observer.stage(stage, i, count);
-                Ok(())
+            let stages = Observed {
+                observer,
+                component: i,
+                components: count,
             };
+            let enter = |stage| stages.enter(stage);
             build_component(component, &requests, config, observer, enter)
         })
         .collect())
+}
+
+/// Who watches which component.
+struct Observed<'a> {
+    observer: &'a dyn Observer,
+    component: usize,
+    components: usize,
+}
+
+impl Observed<'_> {
+    /// Tells that a stage begins, unless the job was to stop.
+    fn enter(&self, stage: &'static str) -> Result<(), BuildError> {
+        if self.observer.cancelled() {
+            return Err(BuildError::Cancelled);
+        }
+        self.observer.stage(stage, self.component, self.components);
+        Ok(())
+    }
 }
 
 /// The pipeline. `enter` is told each stage's name before it begins, and may stop the job.
@@ -67,28 +85,16 @@ fn build_component(
     enter("cones")?;
     let mesh = component.mesh?;
     let prescription = cones::prescribe(&mesh, requests, &config.cones, &config.boundary)?;
-    enter("connectivity")?;
-    let (mesh, prescription, connectivity_repair) = refine_for(config, mesh, prescription)?;
-    let source_length = edge_lengths(&mesh);
-    let c = &mesh.connectivity;
-    enter("flow")?;
-    let metric = ricci::flow(c, &source_length, &prescription, &config.flow, observer)
-        .map_err(|e| BuildError::flow(e, &mesh))?;
-    enter("overlay")?;
-    let Overlay {
+    let Flattened {
         mesh,
         metric,
         prescription,
         layout,
-        unmatched,
-    } = overlay::overlay(mesh, metric, prescription)?;
-    if unmatched > 0 {
-        tracing::warn!(unmatched, "crossings were placed between their neighbours");
-    }
+        layout_cut,
+        cut,
+        connectivity_repair,
+    } = flatten(mesh, prescription, config, observer, &enter)?;
     let c = &mesh.connectivity;
-    enter("cut")?;
-    let layout_cut = cut::cut(&layout.connectivity, &layout.cut_cost(&mesh), &prescription)?;
-    let cut = layout.lift(&layout_cut, c);
     enter("charts")?;
     let unfolded = develop::develop(&layout, layout_cut)?;
     let central = Development::place(c, &cut, &layout, &unfolded);
@@ -125,26 +131,6 @@ fn build_component(
         connectivity_repair,
         quality,
     })
-}
-
-/// Connectivity repair (5.3) where the flow profits from it: around cones, then wherever the scheme's packing could not exist.
-fn refine_for(
-    config: &Config,
-    mesh: Mesh,
-    prescription: Prescription,
-) -> Result<(Mesh, Prescription, ConnectivityRepair), RefineError> {
-    let params = &config.connectivity;
-    if !params.is_enabled(&config.flow) {
-        return Ok((mesh, prescription, ConnectivityRepair::default()));
-    }
-    let (mesh, prescription, done) = refine::refine(mesh, prescription, params)?;
-    refine::make_packable(mesh, prescription, done, config.flow.scheme)
-}
-
-/// Length of every edge in space, source units.
-fn edge_lengths(mesh: &Mesh) -> EdgeVec<f64> {
-    let edges = mesh.connectivity.edges();
-    edges.map(|e| mesh.edge_length(e)).collect()
 }
 
 /// Reads, builds and writes one asset into `output/id`. `given` is the path as the user wrote it.

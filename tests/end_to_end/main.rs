@@ -3,6 +3,7 @@
 mod arrays;
 mod boundaries;
 mod command;
+mod existence;
 mod flows;
 mod good;
 #[cfg(unix)]
@@ -10,3 +11,4 @@ mod interrupt;
 mod prescriptions;
 mod refusals;
 mod replacing;
+mod survey;

@@ -80,8 +80,30 @@ impl Registry {
     }
 }
 
+/// What a folder holds, so that one of another kind is never replaced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Contents {
+    /// An atlas, or a folder a component.
+    Atlas,
+    /// A survey of cones.
+    Cones,
+}
+
+impl Contents {
+    /// Whether an entry of this name is found in complete folders of this kind only.
+    fn has(self, name: &OsStr) -> bool {
+        match self {
+            Contents::Atlas => {
+                name == "atlas.json" || name.to_string_lossy().starts_with("component-")
+            }
+            Contents::Cones => name == "cones.json",
+        }
+    }
+}
+
 /// A folder that is being written; see the module docs.
 pub struct Staging {
+    contents: Contents,
     registry: &'static Registry,
     output_root: PathBuf,
     target: PathBuf,
@@ -92,11 +114,21 @@ impl Staging {
     /// Makes the staging folder of `output_root/asset`, and `output_root` where it is missing.
     /// Refuses a name that is no folder name and a target that this program did not write.
     pub fn begin(output_root: &Path, asset: &str) -> Result<Staging, ExportError> {
-        Self::begin_in(&REGISTRY, output_root, asset)
+        Self::begin_with(Contents::Atlas, output_root, asset)
+    }
+
+    /// The same for other contents.
+    pub fn begin_with(
+        contents: Contents,
+        output_root: &Path,
+        name: &str,
+    ) -> Result<Staging, ExportError> {
+        Self::begin_in(&REGISTRY, contents, output_root, name)
     }
 
     fn begin_in(
         registry: &'static Registry,
+        contents: Contents,
         output_root: &Path,
         asset: &str,
     ) -> Result<Staging, ExportError> {
@@ -110,12 +142,13 @@ impl Staging {
             // What others left must not keep this run from writing.
             tracing::warn!(%error, "could not clear up after earlier runs");
         }
-        check_target(&target)?;
+        check_target(contents, &target)?;
         let path = output_root.join(staging_name());
         fs::create_dir(&path).map_err(ExportError::io(Action::CreateFolder, &path))?;
         state.live.insert(path.clone());
         drop(state);
         Ok(Staging {
+            contents,
             registry,
             output_root: output_root.to_owned(),
             target,
@@ -178,7 +211,7 @@ impl Staging {
         sync_folders(&self.path).map_err(ExportError::io(Action::Publish, &self.target))?;
         {
             let _state = self.registry.lock_open()?;
-            check_target(&self.target)?;
+            check_target(self.contents, &self.target)?;
             replace(&self.path, &self.target)
                 .map_err(ExportError::io(Action::Publish, &self.target))?;
         }
@@ -299,8 +332,8 @@ fn asset_name(name: &str) -> Result<&str, ExportError> {
     Ok(name)
 }
 
-/// Replacing deletes what was there, so it must be nothing, an empty folder, or an earlier atlas.
-fn check_target(target: &Path) -> Result<(), ExportError> {
+/// Replacing deletes what was there, so it must be nothing, an empty folder, or an earlier one of the same kind.
+fn check_target(contents: Contents, target: &Path) -> Result<(), ExportError> {
     let kind = match fs::symlink_metadata(target) {
         Ok(metadata) => metadata.file_type(),
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
@@ -313,9 +346,7 @@ fn check_target(target: &Path) -> Result<(), ExportError> {
     }
     let entries = fs::read_dir(target).and_then(|e| e.collect::<io::Result<Vec<_>>>());
     let names = entries.map_err(ExportError::io(Action::Read, target))?;
-    let ours =
-        |name: &OsStr| name == "atlas.json" || name.to_string_lossy().starts_with("component-");
-    if names.is_empty() || names.iter().any(|e| ours(&e.file_name())) {
+    if names.is_empty() || names.iter().any(|e| contents.has(&e.file_name())) {
         return Ok(());
     }
     Err(ExportError::ForeignFolder {

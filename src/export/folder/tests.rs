@@ -17,7 +17,7 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 fn publish(root: &Path, text: &str) {
-    let staging = Staging::begin_in(registry(), root, "spot").unwrap();
+    let staging = Staging::begin_in(registry(), Contents::Atlas, root, "spot").unwrap();
     staging.write("atlas.json", text.as_bytes()).unwrap();
     staging.write("images/0000.exr", b"texels").unwrap();
     staging.publish().unwrap();
@@ -27,7 +27,7 @@ fn publish(root: &Path, text: &str) {
 fn a_folder_appears_complete_and_replaces_the_older_one() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("a/b");
-    let staging = Staging::begin_in(registry(), &out, "spot").unwrap();
+    let staging = Staging::begin_in(registry(), Contents::Atlas, &out, "spot").unwrap();
     staging.write("atlas.json", b"1").unwrap();
     assert!(!out.join("spot").exists());
     staging.publish().unwrap();
@@ -45,7 +45,7 @@ fn a_folder_appears_complete_and_replaces_the_older_one() {
 fn a_dropped_staging_leaves_nothing_and_the_older_folder_as_it_was() {
     let root = tempfile::tempdir().unwrap();
     publish(root.path(), "old");
-    let staging = Staging::begin_in(registry(), root.path(), "spot").unwrap();
+    let staging = Staging::begin_in(registry(), Contents::Atlas, root.path(), "spot").unwrap();
     staging.write("atlas.json", b"half").unwrap();
     drop(staging);
     assert_eq!(names(root.path()), ["spot"]);
@@ -60,7 +60,7 @@ fn an_interrupt_removes_unfinished_folders_and_refuses_more() {
     let root = tempfile::tempdir().unwrap();
     publish(root.path(), "old");
     let registry = registry();
-    let staging = Staging::begin_in(registry, root.path(), "spot").unwrap();
+    let staging = Staging::begin_in(registry, Contents::Atlas, root.path(), "spot").unwrap();
     let mut open = staging.create("atlas.npz").unwrap();
     registry.close();
     assert_eq!(names(root.path()), ["spot"]);
@@ -69,7 +69,7 @@ fn an_interrupt_removes_unfinished_folders_and_refuses_more() {
         staging.write("atlas.json", b"late"),
         Err(ExportError::Interrupted)
     ));
-    let again = Staging::begin_in(registry, root.path(), "cow");
+    let again = Staging::begin_in(registry, Contents::Atlas, root.path(), "cow");
     assert!(matches!(again, Err(ExportError::Interrupted)));
     assert!(staging.publish().is_err());
     assert_eq!(names(root.path()), ["spot"]);
@@ -87,7 +87,8 @@ fn folders_of_others_are_not_replaced() {
     fs::create_dir(root.path().join("holiday")).unwrap();
     fs::write(root.path().join("holiday/photo.png"), b"dear").unwrap();
     fs::write(root.path().join("file"), b"dear").unwrap();
-    let begin = |name| Staging::begin_in(registry(), root.path(), name).map(|_| ());
+    let begin =
+        |name| Staging::begin_in(registry(), Contents::Atlas, root.path(), name).map(|_| ());
     assert!(matches!(
         begin("holiday"),
         Err(ExportError::ForeignFolder { .. })
@@ -105,7 +106,7 @@ fn folders_of_others_are_not_replaced() {
 #[test]
 fn paths_stay_inside_the_staging_folder() {
     let root = tempfile::tempdir().unwrap();
-    let staging = Staging::begin_in(registry(), root.path(), "spot").unwrap();
+    let staging = Staging::begin_in(registry(), Contents::Atlas, root.path(), "spot").unwrap();
     for path in ["", "../escape", "/etc/escape", "images/../../escape"] {
         assert!(
             matches!(staging.write(path, b""), Err(ExportError::Encode { .. })),
@@ -117,14 +118,14 @@ fn paths_stay_inside_the_staging_folder() {
 #[test]
 fn a_failed_component_keeps_its_older_folder() {
     let root = tempfile::tempdir().unwrap();
-    let staging = Staging::begin_in(registry(), root.path(), "spot").unwrap();
+    let staging = Staging::begin_in(registry(), Contents::Atlas, root.path(), "spot").unwrap();
     staging.write("component-000/atlas.json", b"old 0").unwrap();
     staging
         .write("component-000/images/0000.exr", b"old image")
         .unwrap();
     staging.write("component-001/atlas.json", b"old 1").unwrap();
     staging.publish().unwrap();
-    let staging = Staging::begin_in(registry(), root.path(), "spot").unwrap();
+    let staging = Staging::begin_in(registry(), Contents::Atlas, root.path(), "spot").unwrap();
     assert!(staging.keep_previous(&component_name(0)).unwrap());
     assert!(!staging.keep_previous(&component_name(7)).unwrap());
     staging.write("component-001/atlas.json", b"new 1").unwrap();
@@ -233,4 +234,23 @@ fn an_exchange_swaps_two_folders() {
     if let Err(error) = swapped {
         println!("skipped: no exchange of folders here: {error}");
     }
+}
+
+#[test]
+fn one_kind_of_folder_never_replaces_another() {
+    let root = tempfile::tempdir().unwrap();
+    let begin = |contents, name| Staging::begin_in(registry(), contents, root.path(), name);
+    let cones = begin(Contents::Cones, "spot.cones").unwrap();
+    cones.write("cones.json", b"{}").unwrap();
+    cones.write("spot.cones-8.component-000.png", b"").unwrap();
+    cones.publish().unwrap();
+    let refused = begin(Contents::Atlas, "spot.cones").map(|_| ());
+    assert!(matches!(refused, Err(ExportError::ForeignFolder { .. })));
+    begin(Contents::Cones, "spot.cones").unwrap();
+
+    let atlas = begin(Contents::Atlas, "spot").unwrap();
+    atlas.write("atlas.json", b"{}").unwrap();
+    atlas.publish().unwrap();
+    let refused = begin(Contents::Cones, "spot").map(|_| ());
+    assert!(matches!(refused, Err(ExportError::ForeignFolder { .. })));
 }

@@ -10,6 +10,7 @@
 //! so tiny faces may collapse; `atlas.npz` has the surface in full.
 
 mod materials;
+pub mod region;
 mod vertices;
 
 use crate::export::atlas_json::{self, Document, Patch};

@@ -23,49 +23,53 @@ const MAP: usize = 256;
 const SKY: usize = 64;
 /// Directions of the lamp.
 const LAMP: usize = 12;
-/// Directions handled between two sums, so that memory stays small.
-const BATCH: usize = 8;
 
-/// Shade of points with unit normals among faces. `lamp` and `up` are unit vectors.
-pub fn bake(
-    points: &[(Vec3, Vec3)],
-    positions: &[Vec3],
-    faces: &[[u32; 3]],
-    lamp: Vec3,
+/// Depth maps of a surface from everywhere that light comes from, 40 MB whatever its size.
+pub struct Lights {
+    /// With its direction, and whether that is the lamp's.
+    maps: Vec<(DepthMap, Vec3, bool)>,
     up: Vec3,
-) -> Vec<Shade> {
-    let (low, high) = finite_box(positions);
-    let centre: Vec3 = std::array::from_fn(|i| 0.5 * (low[i] + high[i]));
-    let radius = (0.5 * distance(low, high)).max(f64::MIN_POSITIVE);
-    let map = |direction: Vec3| DepthMap::new(direction, centre, radius, positions, faces);
-    let mut sums = vec![[0.0_f32; 3]; points.len()];
-    let sky = sphere(SKY);
-    let lamps = cone(lamp, LAMP);
-    let all: Vec<(Vec3, bool)> = (sky.into_iter().map(|d| (d, false)))
-        .chain(lamps.into_iter().map(|d| (d, true)))
-        .collect();
-    for batch in all.chunks(BATCH) {
-        let maps: Vec<DepthMap> = batch.par_iter().map(|&(d, _)| map(d)).collect();
-        // Each point adds up its own directions in their order, whichever thread does it.
-        sums.par_iter_mut().zip(points).for_each(|(sum, &(p, n))| {
-            for (map, &(direction, is_lamp)) in maps.iter().zip(batch) {
-                let facing = dot(n, direction) as f32;
-                if is_lamp {
-                    sum[2] += map.visible(p, n);
+}
+
+impl Lights {
+    /// Looks at the faces from every direction. `lamp` and `up` are unit vectors.
+    pub fn new(positions: &[Vec3], faces: &[[u32; 3]], lamp: Vec3, up: Vec3) -> Lights {
+        let (low, high) = finite_box(positions);
+        let centre: Vec3 = std::array::from_fn(|i| 0.5 * (low[i] + high[i]));
+        let radius = (0.5 * distance(low, high)).max(f64::MIN_POSITIVE);
+        let map = |direction: Vec3| DepthMap::new(direction, centre, radius, positions, faces);
+        let all: Vec<(Vec3, bool)> = (sphere(SKY).into_iter().map(|d| (d, false)))
+            .chain(cone(lamp, LAMP).into_iter().map(|d| (d, true)))
+            .collect();
+        let maps = all.into_par_iter().map(|(d, is_lamp)| (map(d), d, is_lamp));
+        Lights {
+            maps: maps.collect(),
+            up,
+        }
+    }
+
+    /// Shade of points with unit normals among the faces.
+    pub fn shade(&self, points: &[(Vec3, Vec3)]) -> Vec<Shade> {
+        let shade = |&(p, n): &(Vec3, Vec3)| {
+            let [mut lit, mut whole, mut lamp] = [0.0_f32; 3];
+            for (map, direction, is_lamp) in &self.maps {
+                let facing = dot(n, *direction) as f32;
+                if *is_lamp {
+                    lamp += map.visible(p, n);
                 } else if facing > 0.0 {
                     // Light from above counts more than light from the ground.
-                    let weight = facing * (0.6 + 0.4 * dot(up, direction) as f32);
-                    sum[0] += weight * map.visible(p, n);
-                    sum[1] += weight;
+                    let weight = facing * (0.6 + 0.4 * dot(self.up, *direction) as f32);
+                    lit += weight * map.visible(p, n);
+                    whole += weight;
                 }
             }
-        });
+            Shade {
+                sky: if whole > 0.0 { lit / whole } else { 1.0 },
+                lamp: lamp / LAMP as f32,
+            }
+        };
+        points.par_iter().map(shade).collect()
     }
-    let shade = |[lit, whole, lamp]: [f32; 3]| Shade {
-        sky: if whole > 0.0 { lit / whole } else { 1.0 },
-        lamp: lamp / LAMP as f32,
-    };
-    sums.into_iter().map(shade).collect()
 }
 
 /// Directions spread evenly over the sphere (a Fibonacci lattice).
@@ -198,7 +202,7 @@ mod tests {
             ([0.0, 0.5, 0.0], up),
             ([0.0, 0.0, 0.0], [0.0, -1.0, 0.0]),
         ];
-        let shades = bake(&points, &positions, &faces, up, up);
+        let shades = Lights::new(&positions, &faces, up, up).shade(&points);
         assert!(
             shades[0].sky < 0.4 && shades[0].lamp < 0.05,
             "{:?}",

@@ -1,16 +1,18 @@
 //! Pictures, rendered by the program itself: no display, no font file, the same bytes for any number of threads.
 //!
-//! *Enters:* an [`AffineAtlas`]. *Leaves:* images in memory.
+//! *Enters:* an [`AffineAtlas`], or several metrics on one mesh. *Leaves:* images in memory.
 //!
 //! * [`preview`]: the surface in space with a checkerboard in flat coordinates, cones and cut.
 //! * [`log_scale`]: the surface in space coloured by the log scale.
 //! * [`layout()`]: the central chart and the packed patches in the plane.
 //! * [`convergence()`]: curvature error against flow time (Fig. 7 of the tutorial).
+//! * [`Gallery`]: log scales of several metrics on one surface, side by side.
 //! * [`encode_png`]: an image as the bytes of a PNG file.
 //!
 //! Pictures of space are made in three steps: `view` looks for a direction that shows much of the
 //! surface, `light` bakes soft light into the vertices, and `raster` finds which triangle each sample of each
-//! pixel sees; what that sample looks like is computed afterwards, once a sample.
+//! pixel sees (all three stand ready in a `studio`); what that sample looks like is computed afterwards, once a sample,
+//! by `paint`.
 //!
 //! Directions are chosen and light is baked on a stand-in of bounded size (`coarse`) where a surface has very many faces.
 //!
@@ -22,15 +24,20 @@ mod coarse;
 mod colour;
 mod convergence;
 mod floor;
+mod gallery;
 mod layout;
 mod light;
+mod paint;
 mod raster;
+mod scale;
 mod scene;
+mod studio;
 mod surface;
 mod text;
 mod view;
 
 pub use convergence::convergence;
+pub use gallery::{Gallery, Panel};
 pub use layout::layout;
 pub use surface::{log_scale, preview};
 
@@ -56,11 +63,11 @@ pub fn write(
     size: usize,
 ) -> Result<(), ExportError> {
     // One view and one light for both pictures of space.
-    let studio = surface::Studio::new(atlas, size);
+    let portrait = surface::Portrait::new(atlas, size);
     let pictures = [
-        ("preview.png", studio.preview()),
+        ("preview.png", portrait.preview()),
         ("layout.png", layout(atlas, size)),
-        ("log-scale.png", studio.log_scale()),
+        ("log-scale.png", portrait.log_scale()),
         ("convergence.png", convergence(atlas, size)),
     ];
     for (name, picture) in pictures {

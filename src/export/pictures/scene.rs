@@ -1,6 +1,6 @@
 //! Marks in space: spheres at cones and tubes along the cut, as triangles like everything else.
 
-use super::colour::Linear;
+use super::colour::{CUT, Linear, NEGATIVE, POSITIVE, to_linear};
 use super::light::across;
 use super::view::{Vec3, along, unit};
 use crate::geometry::mesh::sub;
@@ -65,6 +65,20 @@ impl Marks {
         let axis = unit(sub(to, from));
         let ring = |centre| (centre, radius, 1.0, 0.0);
         self.rings(&[ring(from), ring(to)], axis, 8, colour);
+    }
+
+    /// An edge of the cut: a bar with round ends.
+    pub fn cut_edge(&mut self, from: Vec3, to: Vec3, radius: f64) {
+        let colour = to_linear(CUT);
+        self.bar(from, to, radius, colour);
+        self.sphere(from, radius, colour, 3);
+        self.sphere(to, radius, colour, 3);
+    }
+
+    /// A cone: a ball, red where the curvature is positive and blue where it is negative.
+    pub fn cone(&mut self, place: Vec3, curvature: f64, radius: f64) {
+        let colour = if curvature > 0.0 { POSITIVE } else { NEGATIVE };
+        self.sphere(place, radius, to_linear(colour), 14);
     }
 }
 

@@ -260,3 +260,68 @@ fn nothing_breaks_on_what_cannot_be_drawn() {
     }
     all(&atlas, 100);
 }
+
+/// Panels of a metric that grows along x, one of twice the scale, and one that is not finite.
+fn panels(atlas: &AffineAtlas) -> [Vec<f64>; 3] {
+    let along = |k: f64| (atlas.mesh.positions.iter().map(|p| k * p[0])).collect();
+    [along(1.0), along(2.0), along(f64::NAN)]
+}
+
+fn panel(log_scale: &[f64]) -> Panel<'_> {
+    Panel {
+        title: vec!["above".to_owned(), "(9) 0.1".to_owned()],
+        log_scale,
+        cut: &[[[0.0; 3], [1.0, 0.5, 0.0]]],
+        cones: vec![([1.0, 0.0, 0.0], 2.0), ([-1.0, 0.0, 0.0], -9.0)],
+    }
+}
+
+#[test]
+fn a_gallery_shows_panels_alike_and_side_by_side() {
+    let atlas = torus(24, 12, 0.0);
+    let [one, two, none] = panels(&atlas);
+    let gallery = Gallery::new(&atlas.mesh, 128);
+    let single = gallery.row(&[panel(&one)]);
+    let pair = gallery.row(&[panel(&one), panel(&one)]);
+    assert_eq!(single.dimensions().0 * 2, pair.dimensions().0);
+    assert_eq!(single.dimensions().1, pair.dimensions().1);
+    assert!(single.dimensions().1 >= 128 + 2 * 20);
+    for (x, y, pixel) in single.enumerate_pixels() {
+        assert_eq!(pixel, pair.get_pixel(x, y));
+        assert_eq!(pixel, pair.get_pixel(x + 128, y));
+    }
+    // The same colours mean the same: a wider range beside it makes a panel paler, and itself is the more colourful.
+    let mixed = gallery.row(&[panel(&one), panel(&two)]);
+    let colour = |image: &RgbImage, from: u32| -> i64 {
+        let inside = image
+            .enumerate_pixels()
+            .filter(|(x, ..)| (from..from + 128).contains(x));
+        inside
+            .map(|(.., p)| (i64::from(p.0[0]) - i64::from(p.0[2])).abs())
+            .sum()
+    };
+    let [alone, beside, wide] = [colour(&single, 0), colour(&mixed, 0), colour(&mixed, 128)];
+    assert!(beside < alone && alone < wide, "{beside} {alone} {wide}");
+    // Smaller panels of the same.
+    let small = gallery.overview(&[panel(&one), panel(&two)]);
+    assert_eq!(small.dimensions().0, 128);
+    // What has no number is drawn without a colour, and nothing breaks.
+    gallery.row(&[panel(&one), panel(&none), panel(&[])]);
+    gallery.row(&[]);
+    let barred = Gallery::new(&atlas.mesh, 320).row(&[panel(&one)]);
+    assert!(barred.dimensions().0 > 320);
+}
+
+#[test]
+fn a_gallery_does_not_depend_on_the_thread_count() {
+    let atlas = torus(20, 10, 0.3);
+    let [one, two, _] = panels(&atlas);
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.unwrap().install(|| {
+            let gallery = Gallery::new(&atlas.mesh, 100);
+            encode_png(&gallery.row(&[panel(&one), panel(&two)])).unwrap()
+        })
+    };
+    assert!(with(1) == with(3));
+}

@@ -60,6 +60,15 @@ pub enum ConeError {
         "cones.strategy is \"listed\", but cones.list is empty: add cones or choose another strategy"
     )]
     EmptyList,
+    /// A file of cones that nobody read.
+    #[error(
+        "cones.file names {}, but it was not read: load the configuration with config::load, or fill cones.list and cones.file_lines with cones::file::parse",
+        path.display()
+    )]
+    FileNotRead {
+        /// As written.
+        path: std::path::PathBuf,
+    },
     /// `prescribed` without a list.
     #[error(
         "boundary.condition is \"prescribed\", but boundary.list is empty: add boundary vertices or set the condition to \"uniform\""
@@ -236,6 +245,43 @@ pub enum ConeError {
     NotChosen {
         /// Why.
         reason: String,
+    },
+    /// Too few cones for their total.
+    #[error(
+        "cones.count = {count}, but cones must add up to {} here, and within cones.min_curvature and cones.max_curvature that takes {least}: raise cones.count or widen the limits",
+        in_pi(*total)
+    )]
+    TooFewCones {
+        /// Most that are asked for.
+        count: usize,
+        /// Fewest that are needed.
+        least: usize,
+        /// What they must add up to, radians.
+        total: f64,
+    },
+    /// The total is no multiple of the quantum.
+    #[error(
+        "cones must add up to {} here, which is no multiple of cones.quantum = {}: choose a quantum that divides it",
+        in_pi(*total), in_pi(*quantum)
+    )]
+    NotInQuanta {
+        /// Radians.
+        quantum: f64,
+        /// Radians.
+        total: f64,
+    },
+    /// No cones of whole quanta have the total.
+    #[error(
+        "no {count} cones within cones.min_curvature and cones.max_curvature are multiples of cones.quantum = {} and add up to {}: raise cones.count, widen the limits, or lower the quantum",
+        in_pi(*quantum), in_pi(*total)
+    )]
+    NoQuanta {
+        /// Radians.
+        quantum: f64,
+        /// Radians.
+        total: f64,
+        /// Most that are asked for.
+        count: usize,
     },
     /// Not four corners.
     #[error(

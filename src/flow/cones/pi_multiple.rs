@@ -5,7 +5,9 @@ use serde::{Deserialize, Serialize, Serializer};
 use std::fmt;
 use std::str::FromStr;
 
-/// A multiple of π: a number (`0.5`) or a fraction in quotes (`"1/2"`, `"-8"`, `"-3/2"`), which is kept as it is.
+/// A multiple of π: a number (`0.5`) or a fraction in quotes (`"1/2"`, `"-8"`, `"-3/2"`), which is kept as it is; or an
+/// angle in radians as other programs write it (`"1.5708 rad"`), of which every bit is kept: not every angle is the
+/// rounded product of π and a number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PiMultiple(Form);
 
@@ -14,7 +16,11 @@ enum Form {
     /// Numerator, denominator > 0.
     Fraction(i64, i64),
     Decimal(f64),
+    Radians(f64),
 }
+
+/// What follows an angle in radians.
+const RADIANS: &str = "rad";
 
 impl PiMultiple {
     /// A multiple that this program itself names; a denominator of 0 counts as 1.
@@ -35,9 +41,17 @@ impl PiMultiple {
             .then_some(Self(Form::Decimal(multiple)))
     }
 
+    /// An angle in radians, kept to the last bit; `None` where it is not finite.
+    pub fn from_radians(radians: f64) -> Option<Self> {
+        radians.is_finite().then_some(Self(Form::Radians(radians)))
+    }
+
     /// In radians.
     pub fn radians(self) -> f64 {
-        self.multiple() * std::f64::consts::PI
+        match self.0 {
+            Form::Radians(x) => x,
+            _ => self.multiple() * std::f64::consts::PI,
+        }
     }
 
     /// As a multiple of π.
@@ -45,6 +59,7 @@ impl PiMultiple {
         match self.0 {
             Form::Fraction(n, d) => n as f64 / d as f64,
             Form::Decimal(x) => x,
+            Form::Radians(x) => x / std::f64::consts::PI,
         }
     }
 }
@@ -66,6 +81,10 @@ impl FromStr for PiMultiple {
         let refused = || NotAMultiple {
             text: text.chars().take(40).collect(),
         };
+        if let Some(angle) = text.trim().strip_suffix(RADIANS) {
+            let angle = angle.trim_end().parse::<f64>().ok();
+            return angle.and_then(Self::from_radians).ok_or_else(refused);
+        }
         let (numerator, denominator) = text.split_once('/').unwrap_or((text, "1"));
         let integers = (
             numerator.trim().parse::<i64>(),
@@ -89,6 +108,7 @@ impl fmt::Display for PiMultiple {
             Form::Fraction(n, 1) => write!(f, "{n}"),
             Form::Fraction(n, d) => write!(f, "{n}/{d}"),
             Form::Decimal(x) => write!(f, "{x}"),
+            Form::Radians(x) => write!(f, "{x} {RADIANS}"),
         }
     }
 }
@@ -97,7 +117,7 @@ impl Serialize for PiMultiple {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self.0 {
             Form::Fraction(n, 1) => serializer.serialize_i64(n),
-            Form::Fraction(..) => serializer.collect_str(self),
+            Form::Fraction(..) | Form::Radians(_) => serializer.collect_str(self),
             Form::Decimal(x) => serializer.serialize_f64(x),
         }
     }
@@ -182,9 +202,32 @@ mod tests {
     }
 
     #[test]
+    fn radians_keep_every_bit() {
+        // No double times π rounds to the double after π: multiples pass it by.
+        let passed_by = PI.next_up();
+        assert!(1.0 * PI < passed_by && 1.0_f64.next_up() * PI > passed_by);
+        for x in [passed_by, PI / 2.0, -0.1, 1e-300, -7.25] {
+            let holder: Holder = toml::from_str(&format!("k = \"{x} rad\"")).unwrap();
+            assert_eq!(holder.k.radians(), x);
+            assert!((holder.k.multiple() * PI - x).abs() <= 1e-15 * x.abs());
+            let again: Holder = toml::from_str(&toml::to_string(&holder).unwrap()).unwrap();
+            assert_eq!(again, holder);
+        }
+    }
+
+    #[test]
     fn other_things_are_refused_with_the_remedy() {
         for text in [
-            "\"1/0\"", "\"1/-2\"", "\"half\"", "\"π/2\"", "nan", "inf", "\"\"", "true",
+            "\"1/0\"",
+            "\"1/-2\"",
+            "\"half\"",
+            "\"π/2\"",
+            "nan",
+            "inf",
+            "\"\"",
+            "true",
+            "\"rad\"",
+            "\"nan rad\"",
         ] {
             let error = toml::from_str::<Holder>(&format!("k = {text}")).unwrap_err();
             assert!(

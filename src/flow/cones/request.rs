@@ -1,6 +1,8 @@
 //! Which component, and which of its vertices, the user means.
 
-use super::{BoundaryCondition, BoundaryParams, ConeError, ConeParams, ConeStrategy, spread};
+use super::{
+    BoundaryCondition, BoundaryParams, ConeError, ConeParams, ConeSpec, ConeStrategy, spread,
+};
 use crate::geometry::ids::{NONE, VertexId};
 use crate::geometry::mesh::{Mesh, distance};
 use crate::repair::Repaired;
@@ -39,7 +41,7 @@ pub fn assign(
     check_keys(cones, boundary)?;
     let mut requests = vec![Requests::default(); repaired.components.len()];
     for (i, spec) in cones.list.iter().enumerate() {
-        let key = format!("cones.list[{i}]");
+        let key = key_of_cone(cones, i, spec);
         let place = find(repaired, &key, spec.vertex, spec.point, |_, _| true)?;
         if let Some((component, vertex, named)) = place {
             requests[component].cones.push(RequestedCone {
@@ -78,6 +80,19 @@ pub fn assign(
     Ok(requests)
 }
 
+/// How messages name an entry of the list: by its line where it was read from a file.
+fn key_of_cone(cones: &ConeParams, index: usize, spec: &ConeSpec) -> String {
+    match (cones.file_lines.get(index), spec.vertex) {
+        (Some(line), Some(vertex)) if cones.file_first_vertex > 0 => format!(
+            "cones.file line {line} ({} there, where vertices count from {})",
+            u64::from(vertex) + u64::from(cones.file_first_vertex),
+            cones.file_first_vertex
+        ),
+        (Some(line), _) => format!("cones.file line {line}"),
+        (None, _) => format!("cones.list[{index}]"),
+    }
+}
+
 /// Keys that say two different things.
 fn check_keys(cones: &ConeParams, boundary: &BoundaryParams) -> Result<(), ConeError> {
     let conflict = |first: &str, second: String| {
@@ -87,11 +102,17 @@ fn check_keys(cones: &ConeParams, boundary: &BoundaryParams) -> Result<(), ConeE
         })
     };
     let name = |strategy: ConeStrategy| format!("cones.strategy = \"{}\"", strategy.name());
+    let given = match &cones.file {
+        None => "cones.list",
+        Some(_) if !cones.list.is_empty() => "cones.file",
+        // Only where somebody made the parameters by hand.
+        Some(path) => return Err(ConeError::FileNotRead { path: path.clone() }),
+    };
     match cones.strategy {
         ConeStrategy::Auto => {}
         ConeStrategy::Listed if cones.list.is_empty() => return Err(ConeError::EmptyList),
         ConeStrategy::Listed => {}
-        other if !cones.list.is_empty() => return conflict("cones.list", name(other)),
+        other if !cones.list.is_empty() => return conflict(given, name(other)),
         _ => {}
     }
     if cones.vertex.is_some() && cones.strategy != ConeStrategy::Single {

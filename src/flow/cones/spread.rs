@@ -173,7 +173,7 @@ pub(super) fn nearest_of(connectivity: &Connectivity, sources: &[usize]) -> Vec<
 }
 
 /// Lowers `nearest` to the distance from the sources along the edges (Dijkstra), wherever that is less.
-fn approach(mesh: &Mesh, sources: &[VertexId], nearest: &mut VertexVec<f64>) {
+pub(super) fn approach(mesh: &Mesh, sources: &[VertexId], nearest: &mut VertexVec<f64>) {
     let mut heap = BinaryHeap::new();
     for &vertex in sources {
         nearest[vertex] = 0.0;

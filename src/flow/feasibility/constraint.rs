@@ -1,11 +1,10 @@
 //! Both sides of (6) for one vertex set, and the sets that break it.
 
-use super::{ROOM, Violation, transport};
+use super::exact::{ConeAngle, Exact};
+use super::{Violation, transport};
 use crate::flow::cones::BoundaryCondition;
-use crate::flow::metric::full_angles;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, HalfedgeId, VertexId, VertexVec};
-use std::f64::consts::PI;
 
 /// Which side of the constraint is broken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,11 +38,10 @@ pub struct Slack {
 /// (6) for one connectivity, Φ and prescription.
 pub struct Constraint<'a> {
     connectivity: &'a Connectivity,
-    phi: Option<&'a EdgeVec<f64>>,
     target: &'a VertexVec<f64>,
     free_boundary: bool,
     margin: f64,
-    full_angle: VertexVec<f64>,
+    exact: Exact,
     vertex_mark: VertexVec<u32>,
     face_mark: FaceVec<u32>,
     mark: u32,
@@ -51,21 +49,31 @@ pub struct Constraint<'a> {
 
 impl<'a> Constraint<'a> {
     /// `phi`: intersection angles, radians in [0, π/2]; `None` for Φ ≡ 0. `target`: K̄, radians, one a vertex.
-    /// `margin`: ρ of [the module docs](super), 1 to 2; 1 is (6).
+    /// `margin`: ρ of [the module docs](super), 1 to 2, to hundredths; 1 is (6). Which exact numbers all these stand for is told
+    /// [there](super), too.
     pub fn new(
         connectivity: &'a Connectivity,
-        phi: Option<&'a EdgeVec<f64>>,
+        phi: Option<&EdgeVec<f64>>,
         target: &'a VertexVec<f64>,
         boundary: BoundaryCondition,
         margin: f64,
     ) -> Self {
+        let free_boundary = boundary == BoundaryCondition::Free;
+        let cone_angles = target.enumerate().map(|(v, &curvature)| {
+            let border = connectivity.is_boundary_vertex(v);
+            ConeAngle {
+                full: if border { 1 } else { 2 },
+                curvature,
+                prescribed: !(free_boundary && border),
+            }
+        });
+        let counts = [connectivity.edge_count(), connectivity.face_count()];
         Self {
             connectivity,
-            phi,
             target,
-            free_boundary: boundary == BoundaryCondition::Free,
+            free_boundary,
             margin,
-            full_angle: full_angles(connectivity),
+            exact: Exact::new(&cone_angles.collect(), phi, counts, margin),
             vertex_mark: VertexVec::filled(0, connectivity.vertex_count()),
             face_mark: FaceVec::filled(0, connectivity.face_count()),
             mark: 0,
@@ -76,6 +84,10 @@ impl<'a> Constraint<'a> {
         self.connectivity
     }
 
+    pub(super) fn exact(&self) -> &Exact {
+        &self.exact
+    }
+
     /// False where curvature is not prescribed: on a free boundary.
     pub fn is_prescribed(&self, v: VertexId) -> bool {
         !(self.free_boundary && self.connectivity.is_boundary_vertex(v))
@@ -83,34 +95,46 @@ impl<'a> Constraint<'a> {
 
     /// ρ times the cone angle of a prescribed vertex, radians.
     pub(super) fn wanted(&self, v: VertexId) -> f64 {
-        self.margin * (self.full_angle[v] - self.target[v])
+        self.exact.radians(self.exact.wanted[v])
+    }
+
+    /// Most that the corner at the tail of a halfedge can hold.
+    pub(super) fn exact_room(&self, h: HalfedgeId) -> i128 {
+        self.exact.room[self.connectivity.edge(self.connectivity.next(h))]
     }
 
     /// Most that the corner at the tail of a halfedge can hold, radians.
     pub fn corner_room(&self, h: HalfedgeId) -> f64 {
-        let opposite = self.connectivity.edge(self.connectivity.next(h));
-        let phi = self.phi.map_or(0.0, |phi| phi[opposite]);
-        (PI - phi).max(0.5 * self.face_room())
+        self.exact.radians(self.exact_room(h))
     }
 
     /// What the three corners of a face hold together, radians.
     pub fn face_room(&self) -> f64 {
-        self.margin * PI
+        self.exact.radians(self.exact.whole)
     }
 
-    /// Slacks of any set of prescribed vertices; a vertex named twice counts once.
+    /// Slacks of any set of prescribed vertices, rounded once each: their signs are exact. A vertex named twice counts once.
     pub fn slack(&mut self, set: &[VertexId]) -> Slack {
+        let [upper, lower] = self.exact_slacks(set);
+        Slack {
+            upper: self.exact.radians(upper),
+            lower: self.exact.radians(lower),
+        }
+    }
+
+    /// g(I) = Σ_faces h − Σ_I Θ and Σ_I Θ − Σ_faces h'.
+    pub(super) fn exact_slacks(&mut self, set: &[VertexId]) -> [i128; 2] {
         self.mark += 1;
         let mark = self.mark;
-        let mut wanted = 0.0;
+        let mut wanted = 0;
         for &v in set {
             if self.vertex_mark[v] != mark {
                 self.vertex_mark[v] = mark;
-                wanted += self.wanted(v);
+                wanted += self.exact.wanted[v];
             }
         }
-        let (mut most, mut least) = (0.0, 0.0);
-        let whole = self.face_room();
+        let (mut most, mut least) = (0, 0);
+        let whole = self.exact.whole;
         for &v in set {
             for h in self.connectivity.outgoing(v) {
                 let face = self.connectivity.face(h);
@@ -123,7 +147,7 @@ impl<'a> Constraint<'a> {
                 // What the one corner holds that differs from the other two, if any.
                 let odd = |value: bool| {
                     let corner = inside.iter().position(|&i| i == value);
-                    corner.map_or(0.0, |k| self.corner_room(corners[k]))
+                    corner.map_or(0, |k| self.exact_room(corners[k]))
                 };
                 match inside.iter().filter(|&&i| i).count() {
                     1 => most += odd(true),
@@ -138,45 +162,42 @@ impl<'a> Constraint<'a> {
                 }
             }
         }
-        Slack {
-            upper: most - wanted,
-            lower: wanted - least,
-        }
+        [most - wanted, wanted - least]
     }
 
     /// The set as a region, where it breaks (6).
     fn region(&mut self, vertices: Vec<VertexId>, side: Side) -> Option<Region> {
-        let slack = self.slack(&vertices);
+        let [upper, lower] = self.exact_slacks(&vertices);
         let slack = match side {
-            Side::Below => slack.upper,
-            Side::Above => slack.lower,
+            Side::Below => upper,
+            Side::Above => lower,
         };
-        let c = self.connectivity;
-        let corners: usize = vertices.iter().map(|&v| c.outgoing(v).count()).sum();
-        (slack <= ROOM * (1 + corners) as f64).then_some(Region {
+        (slack <= 0).then(|| Region {
             vertices,
             side,
-            slack,
+            slack: self.exact.radians(slack),
         })
     }
 
-    /// The first vertex that breaks (6) alone.
-    pub(super) fn first_offending_vertex(&mut self) -> Option<Region> {
+    /// The prescribed vertex with the least room left alone, on either side, and that room without the margin's factor, radians: no
+    /// region can be sure of more. `None` where no single vertex is a proper set.
+    pub fn tightest_vertex(&mut self) -> Option<(VertexId, f64)> {
         // All of V is no proper subset.
         if self.connectivity.vertex_count() < 2 {
             return None;
         }
-        let vertices = self.connectivity.vertices();
-        let sides = |v| [(v, Side::Below), (v, Side::Above)];
-        vertices
-            .filter(|&v| self.is_prescribed(v))
-            .flat_map(sides)
-            .collect::<Vec<_>>()
-            .into_iter()
-            .find_map(|(v, side)| self.region(vec![v], side))
+        let mut tightest: Option<(i128, VertexId)> = None;
+        for v in self.connectivity.vertices() {
+            if self.is_prescribed(v) {
+                let [upper, lower] = self.exact_slacks(&[v]);
+                let own = (upper.min(lower), v);
+                tightest = Some(tightest.map_or(own, |t| t.min(own)));
+            }
+        }
+        tightest.map(|(slack, v)| (v, self.exact.radians(slack) / self.margin))
     }
 
-    /// The connected regions that break (6) together, most urgent kind first; none exactly where (6) holds.
+    /// The connected regions that break (6) together; none exactly where (6) holds.
     ///
     /// They are those of the *least* set with the least slack; where the least slack is zero, of one set that has it.
     pub fn offending_regions(&mut self) -> Vec<Region> {
@@ -226,9 +247,22 @@ impl<'a> Constraint<'a> {
     }
 
     /// What to say about a region: both sides of (6), without the margin's factor.
-    pub(super) fn violation(&self, region: &Region) -> Violation {
-        let curvature: f64 = region.vertices.iter().map(|&v| self.target[v]).sum();
-        let slack = region.slack / self.margin;
+    pub(super) fn violation(&mut self, region: Region) -> Violation {
+        let [upper, lower] = self.exact_slacks(&region.vertices);
+        let wanted: i128 = (region.vertices.iter())
+            .map(|&v| self.exact.wanted[v])
+            .sum();
+        let full: i128 = (region.vertices.iter())
+            .map(|&v| match self.connectivity.is_boundary_vertex(v) {
+                true => self.exact.whole,
+                false => 2 * self.exact.whole,
+            })
+            .sum();
+        // K̄ and what bounds it, from the same integers: the two are equal exactly where the slack is zero.
+        let (curvature, bound) = match region.side {
+            Side::Below => (full - wanted, full - wanted - upper),
+            Side::Above => (full - wanted, full - wanted + lower),
+        };
         let strength = |v: VertexId| match region.side {
             Side::Below => -self.target[v],
             Side::Above => self.target[v],
@@ -238,12 +272,11 @@ impl<'a> Constraint<'a> {
         Violation {
             vertex: strongest.unwrap_or(VertexId::new(0)),
             size: region.vertices.len(),
+            vertices: region.vertices,
             side: region.side,
-            curvature,
-            bound: match region.side {
-                Side::Below => curvature - slack,
-                Side::Above => curvature + slack,
-            },
+            curvature: self.exact.radians(curvature) / self.margin,
+            bound: self.exact.radians(bound) / self.margin,
+            slack: region.slack / self.margin,
         }
     }
 

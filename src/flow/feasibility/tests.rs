@@ -1,3 +1,6 @@
+mod brute;
+mod gluing;
+
 use super::*;
 use crate::flow::cones::{BoundaryCondition, Prescription};
 use crate::flow::metric::{Evaluation, Metric};
@@ -325,7 +328,7 @@ fn violations_name_the_vertex_or_the_region() {
     assert!(
         found
             .to_string()
-            .contains("vertex 10 must have more than -12.56")
+            .contains("vertex 10 must have more than -4π of curvature by (6), but exactly that")
     );
     // A little less fits the vertex.
     let fits = torus.prescribe(&[
@@ -356,7 +359,8 @@ fn violations_name_the_vertex_or_the_region() {
     let right = EdgeVec::filled(0.5 * PI, flat.connectivity.edge_count());
     let cones: Vec<_> = (1..5).map(|v| (v, PI)).collect();
     let found = verdict(&flat, Some(&right), &flat.prescribe(&cones)).unwrap_err();
-    assert_eq!((found.vertex, found.side), (VertexId::new(0), Side::Below));
+    assert_eq!((found.size, found.side), (1, Side::Below));
+    assert!([0, 5].contains(&found.vertex.index()));
     // And a ring of large positive cones leaves less than the six faces inside it have.
     let ring: Vec<usize> = around.iter().copied().chain([30]).collect();
     let mut cones: Vec<_> = ring.iter().map(|&v| (v, 1.5 * PI)).collect();
@@ -365,7 +369,7 @@ fn violations_name_the_vertex_or_the_region() {
     assert_eq!((own.size, own.side), (7, Side::Above));
     // Seven cone angles of π/2 against six faces inside: 14π − 6π of curvature is the limit.
     assert!((own.curvature - 10.5 * PI).abs() < 1e-12 && (own.bound - 8.0 * PI).abs() < 1e-12);
-    assert!(own.to_string().contains("must have less than 25.13"));
+    assert!(own.to_string().contains("must have less than 8π"));
 }
 
 #[test]

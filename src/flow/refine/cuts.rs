@@ -1,26 +1,12 @@
-//! Enough edges around *every* set of vertices: criterion 3 of [`super`].
+//! The sets of vertices that lack edges, and the splits that make up for it.
 //!
-//! [`feasibility`](crate::flow::feasibility) finds the sets that lack edges, with a margin. Splitting an edge of a set's link
+//! [`feasibility`](crate::flow::feasibility) finds the sets, with a margin. Splitting an edge of a set's link
 //! gives it one edge more, and what that edge is worth, π − Φ of its halves, is taken to be what the whole was worth:
 //! exact for Φ ≡ 0, a guess otherwise, since Φ follows from the new lengths.
-//! For flat disks and Φ ≡ 0 a margin of 1.5 asks for a link of 3, which every disk has, so nothing far from the cones is touched.
 
-use super::{Editor, MARGIN, OutOfSplits};
-use crate::flow::feasibility::{Constraint, ROOM, Region};
-use crate::geometry::ids::{EdgeVec, HalfedgeId};
-
-/// Splits edges around offending sets until no set lacks edges for tangent circles.
-pub(super) fn widen(editor: &mut Editor) -> Result<(), OutOfSplits> {
-    loop {
-        let shortages = shortages(editor, None, MARGIN);
-        if shortages.is_empty() {
-            return Ok(());
-        }
-        for shortage in &shortages {
-            fill(editor, shortage)?;
-        }
-    }
-}
+use super::{Editor, OutOfSplits};
+use crate::flow::feasibility::{Constraint, Region};
+use crate::geometry::ids::{EdgeVec, HalfedgeId, VertexVec};
 
 /// A region that lacks edges, and what each edge of its link is worth.
 pub(super) struct Shortage {
@@ -29,11 +15,22 @@ pub(super) struct Shortage {
     link: Vec<(HalfedgeId, f64)>,
 }
 
-/// The regions that break (6) with a margin. `phi` as for [`Constraint::new`].
-pub(super) fn shortages(editor: &Editor, phi: Option<&EdgeVec<f64>>, margin: f64) -> Vec<Shortage> {
+impl Shortage {
+    /// What is missing, radians; nothing where both sides are equal.
+    pub fn lacking(&self) -> f64 {
+        self.region.slack.abs()
+    }
+}
+
+/// The regions that break (6) with a margin. `phi` and `target` as for [`Constraint::new`].
+pub(super) fn shortages(
+    editor: &Editor,
+    phi: Option<&EdgeVec<f64>>,
+    target: &VertexVec<f64>,
+    margin: f64,
+) -> Vec<Shortage> {
     let connectivity = &editor.mesh.connectivity;
-    let mut constraint =
-        Constraint::new(connectivity, phi, &editor.target, editor.boundary, margin);
+    let mut constraint = Constraint::new(connectivity, phi, target, editor.boundary, margin);
     let regions = constraint.offending_regions().into_iter();
     let shortage = |region: Region| {
         let link = constraint.link(&region).into_iter();
@@ -43,18 +40,20 @@ pub(super) fn shortages(editor: &Editor, phi: Option<&EdgeVec<f64>>, margin: f64
             region,
         }
     };
-    // Without a link there is nothing to split.
-    regions
-        .map(shortage)
-        .filter(|s| !s.link.is_empty())
-        .collect()
+    regions.map(shortage).collect()
 }
 
-/// Splits edges of the link, long ones first, until their worth makes up for what the region lacks; one at least.
-pub(super) fn fill(editor: &mut Editor, shortage: &Shortage) -> Result<(), OutOfSplits> {
+/// Splits edges of the link, long ones first, until their worth makes up for what the region lacks, times `eagerness`; one at
+/// least, but for a region without a link, where there is nothing to split.
+pub(super) fn fill(
+    editor: &mut Editor,
+    shortage: &Shortage,
+    eagerness: f64,
+) -> Result<(), OutOfSplits> {
     let mut link = shortage.link.clone();
-    let mut lacking = ROOM - shortage.region.slack;
-    while lacking > 0.0 {
+    // Equality is not enough: one edge at least.
+    let mut lacking = eagerness * shortage.lacking();
+    while lacking >= 0.0 {
         let longest = link
             .iter()
             .max_by(|(g, _), (h, _)| editor.by_length(*g, *h));

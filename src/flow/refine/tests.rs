@@ -2,6 +2,8 @@ use super::*;
 use crate::flow::cones::{
     BoundaryParams, ConeParams, ConeSpec, ConeStrategy, PiMultiple, assign, prescribe,
 };
+use crate::flow::feasibility::{self, Constraint};
+use crate::flow::packing;
 use crate::flow::ricci::Scheme;
 use crate::geometry::ids::NONE;
 use crate::geometry::mesh::{Soup, triangle_area};
@@ -231,6 +233,15 @@ fn repair_is_for_flows_that_keep_the_connectivity_unless_it_is_asked_for() {
     }
 }
 
+/// Splits edge 0; what boundaries share is shared twice, which must be the same.
+fn split_once(mesh: Mesh, prescription: Prescription) -> (Mesh, Prescription, ConnectivityRepair) {
+    let mut editor = Editor::new(mesh, prescription, 1);
+    editor.split_edge(EdgeId::new(0)).unwrap();
+    assert!(editor.split_edge(EdgeId::new(0)).is_err());
+    editor.share_uniform_curvature();
+    editor.finish()
+}
+
 /// What was prescribed vertex by vertex stays; a new boundary vertex is straight.
 #[test]
 fn a_split_prescribed_boundary_keeps_every_vertex() {
@@ -240,8 +251,7 @@ fn a_split_prescribed_boundary_keeps_every_vertex() {
     ));
     let given = [(0, 2.0 / 3.0), (1, 2.0 / 3.0), (2, 2.0 / 3.0)];
     let prescribed = targets(&triangle, BoundaryCondition::Prescribed, &given);
-    let (_, after, repair) =
-        raise_valence(triangle, prescribed.clone(), &[(VertexId::new(0), 3)]).unwrap();
+    let (_, after, repair) = split_once(triangle, prescribed.clone());
     assert_eq!(repair.splits, 1);
     assert_eq!(after.boundary, BoundaryCondition::Prescribed);
     assert_eq!(after.target.as_slice()[..3], *prescribed.target.as_slice());
@@ -360,32 +370,11 @@ fn a_split_uniform_boundary_keeps_its_total() {
         BoundaryCondition::Uniform,
         &[(0, 2.0 / 3.0), (1, 2.0 / 3.0), (2, 2.0 / 3.0)],
     );
-    let (new, targets, repair) =
-        raise_valence(triangle, uniform, &[(VertexId::new(0), 3)]).unwrap();
+    let (new, targets, repair) = split_once(triangle, uniform);
     assert_eq!(repair.splits, 1);
     assert_eq!(new.connectivity.vertex_count(), 4);
     assert!(targets.target.iter().all(|&k| (k - PI / 2.0).abs() < 1e-15));
     assert_eq!(targets.cones.len(), 4);
-}
-
-#[test]
-fn listed_vertices_are_raised() {
-    let mesh = mesh_of(&octahedron());
-    let flat = targets(&mesh, BoundaryCondition::Free, &[]);
-    let needed = [(VertexId::new(0), 5), (VertexId::new(5), 5)];
-    let (new, _, repair) = raise_valence(mesh.clone(), flat.clone(), &needed).unwrap();
-    new.connectivity.validate().unwrap();
-    // The poles lie across every edge of the equator: one split serves both.
-    assert_eq!(repair.splits, 1);
-    assert_eq!(doubled_edges(&new.connectivity), []);
-    let missing = raise_valence(mesh, flat, &[(VertexId::new(6), 5)]);
-    assert_eq!(
-        missing.unwrap_err(),
-        RefineError::NoSuchVertex {
-            vertex: 6,
-            vertices: 6
-        }
-    );
 }
 
 #[test]
@@ -410,6 +399,115 @@ fn flat_vertices_of_valence_three_can_be_raised() {
         error.to_string(),
         "connectivity.rings is 4, but must be 0 to 3"
     );
+}
+
+/// Whatever Φ the lengths call for, and however strong the cones: (6) holds afterwards, exactly, or the region is named.
+#[test]
+fn repair_ends_with_a_packing_that_exists() {
+    let mut state = 5u64;
+    let mut below = |n: u64| {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (state >> 33) % n
+    };
+    let soups = [
+        octahedron(),
+        torus(8, 7, &[]),
+        torus(9, 6, &[0, 30]),
+        torus(7, 7, &[3]),
+    ];
+    let (mut tried, mut splits, mut spoilt) = (0, 0, 0);
+    for round in 0..96 {
+        let mut shape = soups[round % 4].clone();
+        // Lengths for which Φ comes out as it likes.
+        for x in shape.positions.iter_mut().flatten() {
+            *x += (below(1000) as f64 / 1000.0 - 0.5) * 0.7;
+        }
+        let mesh = mesh_of(&shape);
+        let c = &mesh.connectivity;
+        let chi = c.topology().euler_characteristic as f64;
+        let inner: Vec<usize> = (c.vertices())
+            .filter(|&v| !c.is_boundary_vertex(v))
+            .map(VertexId::index)
+            .collect();
+        let boundary = match round / 4 % 2 {
+            0 => BoundaryCondition::Free,
+            _ => BoundaryCondition::Uniform,
+        };
+        let mut multiple = vec![0.0; c.vertex_count()];
+        let strong = inner[below(inner.len() as u64) as usize];
+        multiple[strong] = -2.0 * below(4) as f64;
+        let border: Vec<usize> = (c.vertices())
+            .filter(|&v| c.is_boundary_vertex(v))
+            .map(VertexId::index)
+            .collect();
+        // The rest evenly over the boundary, or over all others.
+        let rest: Vec<usize> = match (border.is_empty(), boundary) {
+            (false, BoundaryCondition::Uniform) => border,
+            (false, _) => Vec::new(),
+            _ => inner.iter().copied().filter(|&v| v != strong).collect(),
+        };
+        let share = (2.0 * chi - multiple[strong]) / rest.len().max(1) as f64;
+        for v in &rest {
+            multiple[*v] = share;
+        }
+        // Cone angles are positive.
+        if share > 0.9 {
+            continue;
+        }
+        let cones: Vec<(usize, f64)> = multiple.into_iter().enumerate().collect();
+        let prescription = targets(&mesh, boundary, &cones);
+        let scheme = [Scheme::Tangential, Scheme::Thurston][round / 8 % 2];
+        let done = ConnectivityRepair::default();
+        let holds = |mesh: &Mesh, prescription: &Prescription| {
+            let c = &mesh.connectivity;
+            let length = c.edges().map(|e| mesh.edge_length(e)).collect();
+            let phi = (scheme == Scheme::Thurston)
+                .then(|| packing::fit(c, &length).unwrap().intersection_angles());
+            let (target, boundary) = (&prescription.target, prescription.boundary);
+            let mut constraint = Constraint::new(c, phi.as_ref(), target, boundary, 1.0);
+            feasibility::check(&mut constraint).is_ok()
+        };
+        spoilt += usize::from(!holds(&mesh, &prescription));
+        let (old, old_prescription) = (mesh.clone(), prescription.clone());
+        let (new, after, repair) = make_packable(mesh, prescription, done, scheme).unwrap();
+        assert!(holds(&new, &after), "round {round}");
+        new.connectivity.validate().unwrap();
+        assert_eq!(doubled_edges(&new.connectivity), []);
+        let counts = [&new, &old].map(|m| m.connectivity.vertex_count());
+        assert_eq!(counts[0] - counts[1], repair.splits);
+        let sums = [&old_prescription, &after].map(|p| p.target.iter().sum::<f64>());
+        assert!((sums[0] - sums[1]).abs() < 1e-9);
+        splits += repair.splits;
+        tried += 1;
+    }
+    println!("{spoilt} of {tried} needed {splits} splits");
+    assert!(tried > 60 && spoilt > 20);
+}
+
+/// Where the bound on splits is reached, the repair ends and says which region is still in the way.
+#[test]
+fn repair_that_is_not_done_says_so() {
+    let mesh = mesh_of(&torus(8, 7, &[]));
+    let mut cones: Vec<(usize, f64)> = (0..56).map(|v| (v, 16.0 / 55.0)).collect();
+    cones[3].1 = -16.0;
+    let prescription = targets(&mesh, BoundaryCondition::Free, &cones);
+    for bound in [0, 1, 5] {
+        let mut editor = Editor::new(mesh.clone(), prescription.clone(), bound);
+        let error = packable::widen(&mut editor, Scheme::Tangential).unwrap_err();
+        let said = error.to_string();
+        let RefineError::StillInfeasible { splits, violation } = error else {
+            panic!("{said}");
+        };
+        assert_eq!(splits, bound);
+        assert!(violation.slack < 0.0 && violation.vertices.iter().all(|v| v.index() < 56));
+        let start = format!("no circle packing exists, even after {bound} splits");
+        assert!(said.starts_with(&start), "{said}");
+    }
+    let done = ConnectivityRepair::default();
+    let (_, _, repair) = make_packable(mesh, prescription, done, Scheme::Tangential).unwrap();
+    println!("{} splits are enough", repair.splits);
 }
 
 #[test]

@@ -323,7 +323,9 @@ pub fn flow(
     };
     if phi.is_some() || params.scheme == Scheme::Tangential {
         let boundary = prescription.boundary;
-        let mut constraint = Constraint::new(connectivity, phi.as_ref(), &target, boundary, 1.0);
+        // As it was given: the shares of Gauss–Bonnet's rounding would blur what are multiples of π.
+        let given = &prescription.target;
+        let mut constraint = Constraint::new(connectivity, phi.as_ref(), given, boundary, 1.0);
         feasibility::check(&mut constraint)?;
     }
     let mut problem = Problem {

@@ -1,4 +1,21 @@
-//! Cones chosen by the program (tutorial 5.2, Problem 21).
+//! Cones chosen by the program (tutorial 5.2, Problem 21: number, positions and curvatures of the singularities with least distortion).
+//!
+//! *Enters:* a mesh, what happens on its boundary, how many cones there may be. *Leaves:* vertices and curvatures that meet Gauss–Bonnet.
+//!
+//! | step | follows | ours |
+//! | --- | --- | --- |
+//! | log scale as a linear function of curvature, one factorisation ([`picture`]) | Ben-Chen, Gotsman, Bunin 2008 | variance of every answer at once, from the diagonal of an inverse |
+//! | few cones with little variance of the log scale ([`placement`]) | the aim of Soliman, Slepčev, Crane 2018 and Fang et al. 2021 | exact gain of every vertex without a solve; exchange |
+//! | multiples of a quantum ([`quantum`]) | the aim of Li et al. 2022 | local search on a quadratic function of integers |
+//! | what the mesh really does ([`Placement::correct`]) | | Newton steps with the same factor |
+//! | cones moved until (9) is least ([`moves`], [`area`]) | moving cones: Li et al. 2023 | far moves on cells |
+//!
+//! The two objectives differ. The standard deviation of the log scale counts shrinking and growing alike. (9) is ruled by what grows: an ear
+//! that shrinks to nothing costs it no more than the ear's area, so with few cones its optimum may be a surface that lost its ears.
+//!
+//! *Guaranteed:* the same choice for the same surface, moved, scaled or numbered otherwise, unless places tie; never more cones than asked
+//! for; with a quantum every curvature a multiple of it. *Not guaranteed:* the global optimum. With `count` cones, those that do not pay are left
+//! out.
 
 mod area;
 mod moves;
@@ -10,15 +27,20 @@ mod quantum;
 
 use super::{
     BoundaryCondition, BoundaryParams, ConeError, ConeObjective, ConeParams, RequestedCone,
-    Requests, boundary,
+    Requests, boundary, spread,
 };
 use crate::geometry::connectivity::Topology;
 use crate::geometry::ids::{VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
+use moves::Rule;
 use picture::Picture;
 use placement::Placement;
 use quadratic::Limits;
+use quantum::Quanta;
 use std::f64::consts::TAU;
+
+/// Curvatures in excess of a limit that are rounding, radians.
+const ROUNDING: f64 = 1e-9;
 
 /// The cones of one component.
 pub(super) fn select(
@@ -30,56 +52,85 @@ pub(super) fn select(
     boundary: &BoundaryParams,
 ) -> Result<Vec<RequestedCone>, ConeError> {
     let given = given(mesh, topology, requests, condition, boundary)?;
-    let is_free = topology.boundary_loops > 0 && condition == BoundaryCondition::Free;
-    let t = std::time::Instant::now();
-    let mut picture = Picture::new(mesh, is_free).map_err(|e| ConeError::NotChosen {
-        reason: e.to_string(),
-    })?;
-    let weight = picture.weight.clone();
-    let mut background: Vec<f64> = given
-        .curvature
-        .iter()
-        .zip(&picture.curvature)
-        .map(|(a, b)| a - b)
-        .collect();
-    let mut sink = given.sink;
-    if let Some(total) = given.total {
-        background
-            .iter_mut()
-            .zip(&weight)
-            .for_each(|(b, w)| *b += total * w);
-        sink = weight;
-    }
-    if is_free {
-        sink = Vec::new();
-    }
-    let c = &mesh.connectivity;
-    let allowed: Vec<bool> = c.vertices().map(|v| !c.is_boundary_vertex(v)).collect();
     let limits = Limits {
         range: [cones.min_curvature.radians(), cones.max_curvature.radians()],
         total: given.total,
     };
+    let allowed = allowed(mesh, cones.boundary_distance);
+    let places = allowed.iter().filter(|&&a| a).count();
+    let least = least_count(limits);
+    let most = cones.count.min(places);
+    if most < least {
+        return Err(match places < least {
+            true => ConeError::TooFewVertices {
+                wanted: least,
+                interior: places,
+            },
+            false => ConeError::TooFewCones {
+                count: cones.count,
+                least,
+                total: given.total.unwrap_or(0.0),
+            },
+        });
+    }
+    let quanta = match cones.quantum.radians() {
+        size if size > 0.0 => Some(quanta(size, limits)?),
+        _ => None,
+    };
+    if most == 0 {
+        return Ok(Vec::new());
+    }
+    let is_free = topology.boundary_loops > 0 && condition == BoundaryCondition::Free;
+    let mut picture = Picture::new(mesh, is_free).map_err(not_chosen)?;
+    let mut background: Vec<f64> = given.curvature;
+    let own = background.iter_mut().zip(&picture.curvature);
+    own.for_each(|(b, k)| *b -= k);
+    let mut sink = given.sink;
+    if let Some(total) = given.total {
+        // Cones take their curvature from everywhere, where there is just what they must add up to.
+        let area = background.iter_mut().zip(&picture.weight);
+        area.for_each(|(b, w)| *b += total * w);
+        sink.clone_from(&picture.weight);
+    }
+    let c = &mesh.connectivity;
     let mut placement = Placement::new(&mut picture, c, background, sink, limits, allowed);
-    let choice = placement
-        .search(cones.count)
-        .ok_or_else(|| ConeError::NotChosen {
-            reason: "the places for cones cannot be told apart".into(),
-        })?;
-    let (mut vertices, mut curvature): (Vec<usize>, Vec<f64>) = (
-        choice.sites.iter().map(|s| s.vertex).collect(),
-        choice.best.curvature.clone(),
-    );
-    if cones.objective == ConeObjective::AreaDistortion || std::env::var("AREA").is_ok() {
-        let done = moves::lower_distortion(
-            &mut placement,
-            mesh,
-            &vertices,
-            &curvature,
-            moves::Rule::Best(limits),
-        );
+    let choice = match cones.log_scale_bound {
+        Some(bound) => placement.search_bounded(least, most, bound),
+        None => placement.search(most),
+    };
+    let choice = choice.ok_or_else(|| not_chosen("the places for cones cannot be told apart"))?;
+    let choice = placement.drop_idle(choice, least);
+    let mut vertices = choice.vertices();
+    let mut curvature = choice.best.curvature.clone();
+    if vertices.is_empty() {
+        return Ok(Vec::new());
+    }
+    placement.correct(&vertices, &curvature);
+    let choice = placement.settle(choice).unwrap_or_else(|choice| choice);
+    if cones.objective == ConeObjective::LogScale {
+        vertices = choice.vertices();
+        curvature.clone_from(&choice.best.curvature);
+    }
+    if let Some(quanta) = quanta {
+        let no_way = || ConeError::NoQuanta {
+            quantum: quanta.size,
+            total: given.total.unwrap_or(0.0),
+            count: most,
+        };
+        (vertices, curvature) =
+            quantum::quantise(&mut placement, &choice, quanta, most).ok_or_else(no_way)?;
+    }
+    if cones.objective == ConeObjective::AreaDistortion {
+        let rule = match quanta {
+            Some(_) => Rule::Fixed,
+            None => Rule::Best(limits),
+        };
+        let mut done = moves::lower_distortion(&mut placement, mesh, &vertices, &curvature, rule);
+        if let Some(quanta) = quanta {
+            done.curvature = quantum::transfer(placement.points(), &done, quanta);
+        }
         vertices = done.places.iter().map(|p| p.vertex).collect();
         curvature = done.curvature;
-        eprintln!("area {:?} F {}", t.elapsed(), done.value.exp() - 1.0);
     }
     let cone = |(&v, &curvature): (&usize, &f64)| {
         let vertex = VertexId::new(v);
@@ -89,7 +140,47 @@ pub(super) fn select(
             curvature,
         }
     };
-    Ok(vertices.iter().zip(&curvature).map(cone).collect())
+    let cones = vertices.iter().zip(&curvature).map(cone);
+    Ok(cones
+        .filter(|cone| cone.curvature.abs() > ROUNDING)
+        .collect())
+}
+
+fn not_chosen(reason: impl ToString) -> ConeError {
+    ConeError::NotChosen {
+        reason: reason.to_string(),
+    }
+}
+
+/// The fewest cones that can make up the total within the limits.
+fn least_count(limits: Limits) -> usize {
+    let [low, high] = limits.range;
+    let share = match limits.total {
+        Some(total) if total > ROUNDING => (total - ROUNDING) / high,
+        Some(total) if total < -ROUNDING => (total + ROUNDING) / low,
+        _ => 0.0,
+    };
+    share.ceil() as usize
+}
+
+fn quanta(size: f64, limits: Limits) -> Result<Quanta, ConeError> {
+    Quanta::new(size, limits).ok_or(ConeError::NotInQuanta {
+        quantum: size,
+        total: limits.total.unwrap_or(0.0),
+    })
+}
+
+/// Interior vertices that are no nearer to the boundary than `distance`, in square roots of the area.
+fn allowed(mesh: &Mesh, distance: f64) -> Vec<bool> {
+    let c = &mesh.connectivity;
+    let boundary: Vec<VertexId> = c.vertices().filter(|&v| c.is_boundary_vertex(v)).collect();
+    let mut nearest = VertexVec::filled(f64::INFINITY, c.vertex_count());
+    if distance > 0.0 {
+        spread::approach(mesh, &boundary, &mut nearest);
+    }
+    let least = distance * picture::total_area(mesh).sqrt();
+    let far = |v| !c.is_boundary_vertex(v) && nearest[v] >= least;
+    c.vertices().map(far).collect()
 }
 
 /// What there is without cones.

@@ -15,17 +15,23 @@ use crate::flow::doubled::Doubled;
 use crate::flow::metric::{Evaluation, Metric};
 use crate::flow::ricci::FlowError;
 use crate::flow::ricci::system::{Hessian, System, Unknowns};
-use crate::geometry::ids::{NONE, VertexVec};
+use crate::geometry::ids::{NONE, VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, triangle_area};
 
-/// Shift of the Laplacian in the difference quotient for self-energies; the area is 1. Its square is the relative error; what rounding
-/// adds is below 1e-11.
-const SHIFT: f64 = 1e-3;
+/// Shifts of the Laplacian in the difference quotient for self-energies; the area is 1. The relative error is the square of the shift over
+/// the first eigenvalue; what rounding adds is below 1e-11 for the first. The others are for surfaces so long that the first is too large.
+const SHIFTS: [f64; 3] = [1e-3, 1e-5, 1e-7];
+/// Steps towards the log scale that the mesh really has.
+const CHORD_STEPS: usize = 4;
 
 /// A surface's Laplacian, factorised, and its area.
 pub(super) struct Picture {
     system: System,
     delaunay: Delaunay,
+    /// Every vertex of the double as a vertex of the surface.
+    original: VertexVec<VertexId>,
+    /// 1 where the curvature of the double counts for one vertex of the surface, ½ on the boundary, 0 where u stays.
+    share: Vec<f64>,
     /// Copies of the surface in the double: 1 or 2.
     copies: f64,
     /// Area of each vertex (a third of its faces), all together 1.
@@ -84,11 +90,14 @@ impl Picture {
                 1.0
             }
         };
-        let curvature = surface
-            .vertices()
-            .map(|v| evaluation.curvature[v] * half(v));
+        let vertices = surface.vertices();
+        let curvature = vertices.map(|v| evaluation.curvature[v] * half(v));
+        let vertices = surface.vertices();
+        let share = vertices.map(|v| if prescribed[v] { half(v) } else { 0.0 });
         Ok(Self {
             curvature: curvature.collect(),
+            share: share.collect(),
+            original,
             system,
             copies,
             weight: area,
@@ -150,6 +159,38 @@ impl Picture {
             .collect()
     }
 
+    /// The log scale for which the *mesh* has the curvature `target` (one a vertex, radians), from one near it, as far as some steps with
+    /// the factor of the linear picture lead. Angles are those of the Delaunay triangulation at every u, as in the flow.
+    pub(super) fn corrected(&mut self, start: &[f64], target: &[f64]) -> Vec<f64> {
+        let mut u = start.to_vec();
+        let mut evaluation = Evaluation::default();
+        let mut delaunay = self.delaunay.clone();
+        let mut least = f64::INFINITY;
+        for _ in 0..=CHORD_STEPS {
+            let doubled: VertexVec<f64> = self.original.iter().map(|v| u[v.index()]).collect();
+            Metric::flipping(&mut delaunay).evaluate(&doubled, &mut evaluation);
+            let reached = evaluation.curvature.iter().zip(&self.share);
+            let mut missing: Vec<f64> = reached
+                .zip(target)
+                .map(|((k, share), target)| {
+                    if *share > 0.0 {
+                        target - share * k
+                    } else {
+                        0.0
+                    }
+                })
+                .collect();
+            let error = missing.iter().map(|k| k * k).sum::<f64>();
+            if !(error < least) {
+                break;
+            }
+            least = error;
+            self.solve(&mut missing);
+            u.iter_mut().zip(&missing).for_each(|(u, step)| *u += step);
+        }
+        u
+    }
+
     /// ∫ of a field over the surface, whose area is 1.
     pub(super) fn mean(&self, field: &[f64]) -> f64 {
         self.weight.iter().zip(field).map(|(w, x)| w * x).sum()
@@ -187,9 +228,18 @@ fn squares(
         };
         Ok(unknown.iter().map(at).collect())
     };
-    let (less, more) = (inverse(-SHIFT)?, inverse(SHIFT)?);
-    let difference = less.iter().zip(&more);
-    Ok(difference.map(|(a, b)| (a - b) / (2.0 * SHIFT)).collect())
+    let mut refused = Ok(Vec::new());
+    for shift in SHIFTS {
+        match inverse(-shift) {
+            Ok(less) => {
+                let more = inverse(shift)?;
+                let difference = less.iter().zip(&more);
+                return Ok(difference.map(|(a, b)| (a - b) / (2.0 * shift)).collect());
+            }
+            Err(error) => refused = Err(error),
+        }
+    }
+    refused
 }
 
 /// Area of the surface, squared source units.

@@ -32,6 +32,10 @@ const COARSE_GAIN: f64 = 1e-2;
 const FINE_GAIN: f64 = 1e-4;
 /// Most rounds of adding and taking away.
 const ROUNDS: usize = 3;
+/// A cone is idle that lowers the standard deviation of the log scale by less than this share …
+const IDLE: f64 = 0.01;
+/// … and so is every one where it is below this without.
+const NOTHING: f64 = 1e-6;
 /// Passes of exchanges over all cones.
 const PASSES: usize = 12;
 /// Vertices that are looked at everywhere; from the best of them the search climbs to a vertex that is better than its neighbours.
@@ -47,6 +51,8 @@ const PIECE: usize = 256;
 pub(super) struct Placement<'a> {
     pub(super) picture: &'a mut Picture,
     connectivity: &'a Connectivity,
+    /// Curvature without cones minus that of the surface, radians.
+    background: Vec<f64>,
     /// u without cones.
     pub(super) base: Vec<f64>,
     /// Where the curvature of a cone comes from, adding up to 1; empty where the boundary is free.
@@ -82,6 +88,17 @@ pub(super) struct Choice {
     pub(super) energy: f64,
 }
 
+impl Choice {
+    pub(super) fn vertices(&self) -> Vec<usize> {
+        self.sites.iter().map(|s| s.vertex).collect()
+    }
+
+    /// Standard deviation of the log scale.
+    pub(super) fn deviation(&self) -> f64 {
+        self.energy.max(0.0).sqrt()
+    }
+}
+
 impl<'a> Placement<'a> {
     /// `background`: the curvature that there is without cones minus that of the surface, radians; adds up to 0 unless the boundary is
     /// free.
@@ -93,7 +110,7 @@ impl<'a> Placement<'a> {
         limits: Limits,
         allowed: Vec<bool>,
     ) -> Self {
-        let mut base = background;
+        let mut base = background.clone();
         picture.solve(&mut base);
         let mut placement = Self {
             base_energy: 0.0,
@@ -101,6 +118,7 @@ impl<'a> Placement<'a> {
             self_energy: picture.self_energies(&sink),
             samples: sample(connectivity, &allowed, &base, SAMPLES),
             base,
+            background,
             picture,
             connectivity,
             sink,
@@ -108,13 +126,62 @@ impl<'a> Placement<'a> {
             allowed,
             known: BTreeMap::new(),
         };
-        placement.slope = placement.base.clone();
-        placement.picture.centre(&mut placement.slope);
-        placement.base_energy = dot(&placement.slope, &placement.base);
-        let mut slope = std::mem::take(&mut placement.slope);
-        placement.dual(&mut slope);
-        placement.slope = slope;
+        placement.weigh_base();
         placement
+    }
+
+    fn weigh_base(&mut self) {
+        let mut slope = self.base.clone();
+        self.picture.centre(&mut slope);
+        self.base_energy = dot(&slope, &self.base);
+        self.dual(&mut slope);
+        self.slope = slope;
+    }
+
+    /// Counts u from now on from what the mesh really does with these cones: adds to u without cones the difference between the mesh's own log
+    /// scale and that of the linear picture.
+    pub(super) fn correct(&mut self, vertices: &[usize], curvature: &[f64]) {
+        let cones = || vertices.iter().zip(curvature);
+        let linear = self.log_scale_of(cones());
+        let mut target: Vec<f64> = self.background.clone();
+        self.add_cones(&mut target, cones());
+        let own = target.iter_mut().zip(&self.picture.curvature);
+        own.for_each(|(t, k)| *t += k);
+        let real = self.picture.corrected(&linear, &target);
+        if real.iter().all(|u| u.is_finite()) {
+            let difference = real.iter().zip(&linear).map(|(r, l)| r - l);
+            self.base
+                .iter_mut()
+                .zip(difference)
+                .for_each(|(b, d)| *b += d);
+            self.weigh_base();
+        }
+    }
+
+    fn add_cones<'c>(&self, field: &mut [f64], cones: impl Iterator<Item = (&'c usize, &'c f64)>) {
+        for (&v, c) in cones {
+            field[v] += c;
+            field
+                .iter_mut()
+                .zip(&self.sink)
+                .for_each(|(x, s)| *x -= c * s);
+        }
+    }
+
+    /// u of some cones, with mean 0 unless the boundary is free.
+    pub(super) fn log_scale_of<'c>(
+        &mut self,
+        cones: impl Iterator<Item = (&'c usize, &'c f64)>,
+    ) -> Vec<f64> {
+        let mut field = vec![0.0; self.len()];
+        self.add_cones(&mut field, cones);
+        self.picture.solve(&mut field);
+        field.iter_mut().zip(&self.base).for_each(|(x, b)| *x += b);
+        if !self.sink.is_empty() {
+            let mean = self.picture.mean(&field);
+            field.iter_mut().for_each(|x| *x -= mean);
+        }
+        field
     }
 
     /// Number of vertices.
@@ -365,6 +432,9 @@ impl<'a> Placement<'a> {
     /// Exchange finds a local optimum. So as many cones again are added, the least valuable of all are taken away, and cones are
     /// exchanged once more, as long as that helps.
     pub(super) fn search(&mut self, count: usize) -> Option<Choice> {
+        if count == 0 {
+            return self.choose(Vec::new());
+        }
         let start = self.choose(Vec::new())?;
         let start = self.grow(start, count);
         let mut choice = self.exchange(start, COARSE_GAIN);
@@ -404,28 +474,65 @@ impl<'a> Placement<'a> {
         Some(choice)
     }
 
+    /// The same places and their neighbourhood weighed anew, after u without cones has changed. The old choice where that fails.
+    pub(super) fn settle(&mut self, choice: Choice) -> Result<Choice, Choice> {
+        match self.choose(choice.sites.clone()) {
+            Some(weighed) => Ok(self.exchange(weighed, FINE_GAIN)),
+            None => Err(choice),
+        }
+    }
+
+    /// Takes away cones that do not pay, as long as more than `least` are left: those without which the standard deviation of the log
+    /// scale grows by less than a share of it, or stays nothing.
+    pub(super) fn drop_idle(&self, mut choice: Choice, least: usize) -> Choice {
+        while choice.sites.len() > least {
+            let Some(fewer) = self.cheapest_removal(&choice) else {
+                break;
+            };
+            let (with, without) = (choice.deviation(), fewer.deviation());
+            if without > NOTHING && without > with * (1.0 + IDLE) {
+                break;
+            }
+            choice = fewer;
+        }
+        choice
+    }
+
+    /// The fewest cones, from `least` to `most`, with |u − mean| within `bound` on every face, or `most` of them.
+    pub(super) fn search_bounded(
+        &mut self,
+        least: usize,
+        most: usize,
+        bound: f64,
+    ) -> Option<Choice> {
+        let mut choice = self.search(least)?;
+        while self.largest_deviation(&choice) > bound && choice.sites.len() < most {
+            let Some(more) = self.add(&choice) else { break };
+            choice = self.exchange(more, COARSE_GAIN);
+        }
+        Some(self.exchange(choice, FINE_GAIN))
+    }
+
+    /// max |u − mean| over the faces, u of a face being that of its corners on average.
+    fn largest_deviation(&mut self, choice: &Choice) -> f64 {
+        let vertices = choice.vertices();
+        let u = self.log_scale_of(vertices.iter().zip(&choice.best.curvature));
+        let mean = self.picture.mean(&u);
+        let faces = self.connectivity.faces();
+        faces
+            .map(|f| {
+                let corners = self.connectivity.face_vertices(f);
+                let own = corners.iter().map(|v| u[v.index()]).sum::<f64>() / 3.0;
+                (own - mean).abs()
+            })
+            .fold(0.0, f64::max)
+    }
+
     /// Without the cone that is worth least.
     pub(super) fn cheapest_removal(&self, choice: &Choice) -> Option<Choice> {
         (0..choice.sites.len())
             .filter_map(|i| self.without(choice, i))
             .reduce(|a, b| if b.energy < a.energy { b } else { a })
-    }
-
-    /// u of a choice, with mean 0.
-    pub(super) fn log_scale(&mut self, choice: &Choice) -> Vec<f64> {
-        let mut field = vec![0.0; self.len()];
-        for (site, c) in choice.sites.iter().zip(&choice.best.curvature) {
-            field[site.vertex] += c;
-            field
-                .iter_mut()
-                .zip(&self.sink)
-                .for_each(|(x, s)| *x -= c * s);
-        }
-        self.picture.solve(&mut field);
-        field.iter_mut().zip(&self.base).for_each(|(x, b)| *x += b);
-        let mean = self.picture.mean(&field);
-        field.iter_mut().for_each(|x| *x -= mean);
-        field
     }
 }
 

@@ -1,0 +1,95 @@
+//! The first half of the pipeline: from a component and its cones to a slit surface with a flat metric.
+//!
+//! *Enters:* a mesh and its target curvature. *Leaves:* a [`Flattened`] surface: the refined mesh with its flat metric, and the cut
+//! that opens it into a disk. What a build and a survey of cones have in common; it depends on nothing that
+//! either does afterwards.
+
+use super::BuildError;
+use crate::atlas::cut::{self, CutGraph};
+use crate::atlas::overlay::{self, Layout, Overlay};
+use crate::config::Config;
+use crate::flow::cones::Prescription;
+use crate::flow::refine::{self, RefineError};
+use crate::flow::ricci::{self, FlatMetric};
+use crate::geometry::ids::EdgeVec;
+use crate::geometry::mesh::Mesh;
+use crate::observe::Observer;
+use crate::product::ConnectivityRepair;
+
+/// A slit surface with a flat metric, before it is developed.
+pub(super) struct Flattened {
+    /// Surface after connectivity repair, refined by the flat triangulation. Its first vertices are those it had before.
+    pub mesh: Mesh,
+    /// Flat metric on its edges.
+    pub metric: FlatMetric,
+    /// Target curvature of its vertices.
+    pub prescription: Prescription,
+    /// What is cut and developed.
+    pub layout: Layout,
+    /// The cut on the layout.
+    pub layout_cut: CutGraph,
+    /// The cut on the mesh.
+    pub cut: CutGraph,
+    /// What connectivity repair changed.
+    pub connectivity_repair: ConnectivityRepair,
+}
+
+/// Repairs connectivity, flows, refines and cuts. `enter` is told each stage's name before it begins, and may stop the job.
+pub(super) fn flatten(
+    mesh: Mesh,
+    prescription: Prescription,
+    config: &Config,
+    observer: &dyn Observer,
+    enter: &impl Fn(&'static str) -> Result<(), BuildError>,
+) -> Result<Flattened, BuildError> {
+    enter("connectivity")?;
+    let (mesh, prescription, connectivity_repair) = refine_for(config, mesh, prescription)?;
+    let source_length = edge_lengths(&mesh);
+    let c = &mesh.connectivity;
+    enter("flow")?;
+    let metric = ricci::flow(c, &source_length, &prescription, &config.flow, observer)
+        .map_err(|e| BuildError::flow(e, &mesh))?;
+    enter("overlay")?;
+    let Overlay {
+        mesh,
+        metric,
+        prescription,
+        layout,
+        unmatched,
+    } = overlay::overlay(mesh, metric, prescription)?;
+    if unmatched > 0 {
+        tracing::warn!(unmatched, "crossings were placed between their neighbours");
+    }
+    enter("cut")?;
+    let layout_cut = cut::cut(&layout.connectivity, &layout.cut_cost(&mesh), &prescription)?;
+    let cut = layout.lift(&layout_cut, &mesh.connectivity);
+    Ok(Flattened {
+        mesh,
+        metric,
+        prescription,
+        layout,
+        layout_cut,
+        cut,
+        connectivity_repair,
+    })
+}
+
+/// Connectivity repair (5.3) where the flow profits from it: around cones, then wherever the scheme's packing could not exist.
+pub(super) fn refine_for(
+    config: &Config,
+    mesh: Mesh,
+    prescription: Prescription,
+) -> Result<(Mesh, Prescription, ConnectivityRepair), RefineError> {
+    let params = &config.connectivity;
+    if !params.is_enabled(&config.flow) {
+        return Ok((mesh, prescription, ConnectivityRepair::default()));
+    }
+    let (mesh, prescription, done) = refine::refine(mesh, prescription, params)?;
+    refine::make_packable(mesh, prescription, done, config.flow.scheme)
+}
+
+/// Length of every edge in space, source units.
+fn edge_lengths(mesh: &Mesh) -> EdgeVec<f64> {
+    let edges = mesh.connectivity.edges();
+    edges.map(|e| mesh.edge_length(e)).collect()
+}

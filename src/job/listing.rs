@@ -1,0 +1,190 @@
+//! The cones of a prescription in words, a line a group.
+
+use super::inspect::counted;
+use crate::flow::cones::{Prescription, in_pi};
+use crate::geometry::mesh::Mesh;
+use std::f64::consts::PI;
+
+/// At most so many vertices stand in one line.
+const LISTED: usize = 12;
+/// Longer curvatures are rounded.
+const SHORT: usize = 7;
+
+/// Vertices that get the same curvature, as far as it is shown.
+struct Group {
+    inside: bool,
+    curvature: String,
+    vertices: Vec<u32>,
+}
+
+/// One line for all cones of the same curvature, inside or on the boundary, and one for those inside that have a curvature each
+/// of their own; in the order of the first vertex of each.
+pub(super) fn cones(mesh: &Mesh, prescription: &Prescription) -> Vec<String> {
+    if prescription.cones.is_empty() {
+        return vec!["cones: none".to_owned()];
+    }
+    let groups = by_curvature(mesh, prescription);
+    let is_single = |g: &&Group| g.inside && g.vertices.len() == 1;
+    let singles: Vec<&Group> = groups.iter().filter(is_single).collect();
+    // One or two read better in lines of their own.
+    let joined = singles.len() > 2;
+    let mut lines = Vec::new();
+    let mut told = false;
+    for group in &groups {
+        if !(joined && is_single(&group)) {
+            lines.push(of_one_curvature(group));
+        } else if !told {
+            told = true;
+            lines.push(of_own_curvature(&singles));
+        }
+    }
+    lines
+}
+
+fn by_curvature(mesh: &Mesh, prescription: &Prescription) -> Vec<Group> {
+    let mut groups: Vec<Group> = Vec::new();
+    for cone in &prescription.cones {
+        let vertex = mesh.source_vertex[cone.vertex];
+        let inside = !mesh.connectivity.is_boundary_vertex(cone.vertex);
+        let curvature = short(cone.curvature);
+        let same = |g: &&mut Group| g.inside == inside && g.curvature == curvature;
+        match groups.iter_mut().find(same) {
+            Some(group) => group.vertices.push(vertex),
+            None => groups.push(Group {
+                inside,
+                curvature,
+                vertices: vec![vertex],
+            }),
+        }
+    }
+    groups
+}
+
+/// A curvature in multiples of π: as it is where that is short, else to three digits.
+fn short(radians: f64) -> String {
+    let exact = in_pi(radians);
+    match exact.chars().count() <= SHORT {
+        true => exact,
+        false => format!("{:.3}π", radians / PI),
+    }
+}
+
+/// `8 cones of 0.5π: at vertices 3, 7 and 9 of the file`.
+fn of_one_curvature(group: &Group) -> String {
+    let count = match group.inside {
+        true => counted(group.vertices.len(), "cone", "cones"),
+        false => counted(group.vertices.len(), "boundary vertex", "boundary vertices"),
+    };
+    let names: Vec<String> = group.vertices.iter().map(u32::to_string).collect();
+    let noun = match names.len() {
+        1 => "vertex",
+        _ => "vertices",
+    };
+    format!("{count} of {}: at {noun} {}", group.curvature, few(&names))
+}
+
+/// `8 cones: 0.512π at vertex 17, -0.25π at 203 and 0.3π at 9 of the file`.
+fn of_own_curvature(singles: &[&Group]) -> String {
+    let names: Vec<String> = (singles.iter().enumerate())
+        .flat_map(|(i, group)| group.vertices.iter().map(move |v| (i, group, v)))
+        .map(|(i, group, vertex)| match i {
+            0 => format!("{} at vertex {vertex}", group.curvature),
+            _ => format!("{} at {vertex}", group.curvature),
+        })
+        .collect();
+    format!("{} cones: {}", singles.len(), few(&names))
+}
+
+/// The first names, and how many more there are.
+fn few(names: &[String]) -> String {
+    match names {
+        [only] => format!("{only} of the file"),
+        many if many.len() > LISTED => format!(
+            "{} … of the file, {} more",
+            many[..LISTED].join(", "),
+            many.len() - LISTED
+        ),
+        [first @ .., last] => format!("{} and {last} of the file", first.join(", ")),
+        [] => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::cones::BoundaryCondition;
+    use crate::geometry::ids::{VertexId, VertexVec};
+    use crate::geometry::mesh::Soup;
+    use crate::repair::{RepairParams, repair};
+
+    /// A flat square of 5 × 5 vertices in rows.
+    fn square() -> Mesh {
+        let positions = (0..25).map(|v| [f64::from(v % 5), f64::from(v / 5), 0.0]);
+        let cells = (0..16).map(|c| 5 * (c / 4) + c % 4);
+        let faces = cells.flat_map(|a| [[a, a + 1, a + 6], [a, a + 6, a + 5]]);
+        let soup = Soup::from_triangles(positions.collect(), faces.collect());
+        let repaired = repair(&soup, &RepairParams::default()).unwrap();
+        repaired.components[0].mesh.clone().unwrap()
+    }
+
+    fn lines(given: &[(usize, f64)]) -> Vec<String> {
+        let mut target = VertexVec::filled(0.0, 25);
+        for &(v, multiple) in given {
+            target[VertexId::new(v)] = multiple * PI;
+        }
+        let prescription = Prescription::new(target, BoundaryCondition::Uniform);
+        cones(&square(), &prescription)
+    }
+
+    #[test]
+    fn equal_curvatures_share_a_line_and_others_another() {
+        assert_eq!(lines(&[]), ["cones: none"]);
+        assert_eq!(
+            lines(&[(6, 0.5), (7, 0.5), (8, 0.5)]),
+            ["3 cones of 0.5π: at vertices 6, 7 and 8 of the file"]
+        );
+        assert_eq!(
+            lines(&[
+                (6, 0.512345),
+                (7, 1.0),
+                (8, 1.0 / 3.0),
+                (11, -0.25),
+                (12, 1.0)
+            ]),
+            [
+                "3 cones: 0.512π at vertex 6, 1/3π at 8 and -0.25π at 11 of the file",
+                "2 cones of 1π: at vertices 7 and 12 of the file"
+            ]
+        );
+        assert_eq!(
+            lines(&[(6, 1.23456789), (16, 0.7)]),
+            [
+                "1 cone of 1.235π: at vertex 6 of the file",
+                "1 cone of 0.7π: at vertex 16 of the file"
+            ]
+        );
+    }
+
+    #[test]
+    fn boundary_vertices_are_called_so_and_many_are_cut_short() {
+        let inside = [6, 7, 8, 11, 12, 13, 16, 17, 18];
+        let border: Vec<(usize, f64)> = (0..25)
+            .filter(|v| !inside.contains(v))
+            .map(|v| (v, 0.125))
+            .collect();
+        assert_eq!(
+            lines(&border),
+            [
+                "16 boundary vertices of 0.125π: at vertices 0, 1, 2, 3, 4, 5, 9, 10, 14, 15, 19, 20 … of the file, 4 more"
+            ]
+        );
+        // One of the border keeps its line, however many others there are.
+        assert_eq!(
+            lines(&[(0, 0.3), (6, 0.0123456), (7, -0.1), (8, 0.2)]),
+            [
+                "1 boundary vertex of 0.3π: at vertex 0 of the file",
+                "3 cones: 0.012π at vertex 6, -0.1π at 7 and 0.2π at 8 of the file"
+            ]
+        );
+    }
+}
