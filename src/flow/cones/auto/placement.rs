@@ -36,6 +36,8 @@ const ROUNDS: usize = 3;
 const IDLE: f64 = 0.01;
 /// … and so is every one where it is below this without.
 const NOTHING: f64 = 1e-6;
+/// Vertices of all searches from a first cone of their own.
+const STARTS: usize = 20_000;
 /// Passes of exchanges over all cones.
 const PASSES: usize = 12;
 /// Vertices that are looked at everywhere; from the best of them the search climbs to a vertex that is better than its neighbours.
@@ -435,9 +437,7 @@ impl<'a> Placement<'a> {
         if count == 0 {
             return self.choose(Vec::new());
         }
-        let start = self.choose(Vec::new())?;
-        let start = self.grow(start, count);
-        let mut choice = self.exchange(start, COARSE_GAIN);
+        let mut choice = self.first_choice(count)?;
         for _ in 0..ROUNDS {
             let more = self.grow(choice.clone(), 2 * count.max(2));
             let Some(fewer) = self.prune(more, count) else {
@@ -455,6 +455,30 @@ impl<'a> Placement<'a> {
         }
         choice = self.exchange_pairs(choice, COARSE_GAIN);
         Some(self.exchange(choice, FINE_GAIN))
+    }
+
+    /// From nothing to cones that no single move improves much. On a small mesh, where that is cheap, the first cone is put at several places
+    /// in turn.
+    fn first_choice(&mut self, count: usize) -> Option<Choice> {
+        let starts = (STARTS / self.len().max(1)).min(self.samples.len());
+        let step = self.samples.len().div_ceil(starts.max(1)).max(1);
+        let firsts = self.samples.iter().copied().step_by(step).take(starts);
+        let mut starts = vec![Vec::new()];
+        for first in firsts.collect::<Vec<usize>>() {
+            starts.push(self.sites(&[first]));
+        }
+        let mut best: Option<Choice> = None;
+        for start in starts {
+            let Some(start) = self.choose(start) else {
+                continue;
+            };
+            let start = self.grow(start, count);
+            let choice = self.exchange(start, COARSE_GAIN);
+            if best.as_ref().is_none_or(|b| choice.energy < b.energy) {
+                best = Some(choice);
+            }
+        }
+        best
     }
 
     /// Adds the best vertex again and again.
