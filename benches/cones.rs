@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             for count in [8, 16] {
                 for objective in [ConeObjective::LogScale, ConeObjective::AreaDistortion] {
                     let params = ConeParams {
-                        count,
+                        count: Some(count),
                         objective,
                         ..ConeParams::default()
                     };

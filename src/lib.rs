@@ -26,7 +26,7 @@
 //!     vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
 //! );
 //! let mut config = Config::default();
-//! config.cones.count = 4;
+//! config.cones.count = Some(4);
 //! let atlases = build(&soup, &config, &())?;
 //! let atlas = atlases[0].as_ref().unwrap();
 //! assert_eq!(atlas.prescription.cones.len(), 4);

@@ -229,7 +229,7 @@ pub const KEYS: &[Key] = &[
             max: 1_000_000,
         },
         "cones",
-        "8",
+        "absent",
     ),
     key(
         "cones.log_scale_bound",

@@ -38,6 +38,8 @@ use crate::geometry::mesh::Mesh;
 use std::f64::consts::{PI, TAU};
 use std::path::PathBuf;
 
+/// Cones where their number is not given.
+const DEFAULT_COUNT: usize = 8;
 /// Largest miss of Gauss–Bonnet, radians, that counts as rounding of what the user wrote; it is then shared out
 /// among the cones.
 const GAUSS_BONNET_TOLERANCE: f64 = 1e-9;
@@ -146,8 +148,10 @@ pub struct ConeParams {
     pub strategy: ConeStrategy,
     /// Cones by name; not empty means strategy `listed`.
     pub list: Vec<ConeSpec>,
-    /// Number of cones for `spread`, at least 1; the most that `auto` places in the interior.
-    pub count: usize,
+    /// Number of cones for `spread`, at least 1; the most that `auto` places in the interior. Absent: 8, but where curvature is
+    /// prescribed on the boundary `auto` places no more than Gauss–Bonnet needs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub count: Option<usize>,
     /// For `auto`: as few cones as keep |log scale − mean| below this where `count` allows; absent: `count` of them, as far as they pay.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub log_scale_bound: Option<f64>,
@@ -182,7 +186,7 @@ impl Default for ConeParams {
         Self {
             strategy: ConeStrategy::Auto,
             list: Vec::new(),
-            count: 8,
+            count: None,
             log_scale_bound: None,
             quantum: PiMultiple::literal(0, 1),
             objective: ConeObjective::default(),
@@ -351,18 +355,19 @@ fn choose(
             spread_cones(mesh, count, curvature)
         }
         ConeStrategy::Spread => {
-            if params.count == 0 {
+            let count = params.count.unwrap_or(DEFAULT_COUNT);
+            if count == 0 {
                 return Err(ConeError::NoCount);
             }
-            let share = total / params.count as f64;
+            let share = total / count as f64;
             let curvature = params.curvature.map_or(share, PiMultiple::radians);
             if curvature == 0.0 {
                 return Err(ConeError::NothingToSpread {
-                    count: params.count,
+                    count,
                     chi: topology.euler_characteristic,
                 });
             }
-            spread_cones(mesh, params.count, curvature)
+            spread_cones(mesh, count, curvature)
         }
         ConeStrategy::Single if total == 0.0 => Ok(Vec::new()),
         ConeStrategy::Single => {

@@ -20,7 +20,7 @@ pub fn beside_spread(file: &Path) -> Result<(), String> {
     };
     let blind = ConeParams {
         strategy,
-        count,
+        count: Some(count),
         ..ConeParams::default()
     };
     let before = models::finished(&triangles, blind)?;

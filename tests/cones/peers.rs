@@ -40,7 +40,7 @@ pub fn beaten(corpus: &Path, peer: &[Measured], objective: ConeObjective) -> Res
     let mut worse = Vec::new();
     for &(model, count, area, std) in peer {
         let params = ConeParams {
-            count,
+            count: Some(count),
             objective,
             ..ConeParams::default()
         };

@@ -18,7 +18,7 @@ pub fn quarter_turns(corpus: &Path, objective: ConeObjective) -> Result<(), Stri
         let triangles = models::read(&corpus.join(model));
         for count in COUNTS {
             let any = ConeParams {
-                count,
+                count: Some(count),
                 objective,
                 ..ConeParams::default()
             };

@@ -20,7 +20,7 @@ pub fn platonic(objective: ConeObjective) -> Result<(), String> {
             let mesh = models::mesh(&shape);
             for count in [corners, corners + 4] {
                 let params = ConeParams {
-                    count,
+                    count: Some(count),
                     objective,
                     ..ConeParams::default()
                 };
@@ -61,7 +61,7 @@ pub fn mirror(objective: ConeObjective) -> Result<(), String> {
     let mut failed = Vec::new();
     for count in [3, 4, 5, 6, 8, 10, 12, 16] {
         let params = ConeParams {
-            count,
+            count: Some(count),
             objective,
             ..ConeParams::default()
         };

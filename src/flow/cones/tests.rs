@@ -235,7 +235,7 @@ fn the_choice_does_not_depend_on_the_numbering() {
 fn spread_cones_keep_off_the_boundary_and_each_other() {
     let cones = ConeParams {
         strategy: ConeStrategy::Spread,
-        count: 2,
+        count: Some(2),
         curvature: Some(multiple(1, 4)),
         ..ConeParams::default()
     };
@@ -367,7 +367,7 @@ fn impossible_cones_are_refused() {
         (
             ConeParams {
                 strategy: ConeStrategy::Spread,
-                count: 0,
+                count: Some(0),
                 ..ConeParams::default()
             },
             "cones.count is 0",
@@ -375,7 +375,7 @@ fn impossible_cones_are_refused() {
         (
             ConeParams {
                 strategy: ConeStrategy::Spread,
-                count: 1000,
+                count: Some(1000),
                 ..ConeParams::default()
             },
             "has 32 interior vertices",
@@ -383,7 +383,7 @@ fn impossible_cones_are_refused() {
         (
             ConeParams {
                 strategy: ConeStrategy::Spread,
-                count: 2,
+                count: Some(2),
                 ..ConeParams::default()
             },
             "less than 2π",

@@ -136,7 +136,7 @@ pub fn survey(
 fn with_cones(config: &Config, strategy: ConeStrategy, count: usize) -> Config {
     let cones = ConeParams {
         strategy,
-        count: count.max(1),
+        count: Some(count.max(1)),
         list: Vec::new(),
         file: None,
         file_lines: Vec::new(),

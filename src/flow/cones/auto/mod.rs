@@ -26,15 +26,15 @@ mod quadratic;
 mod quantum;
 
 use super::{
-    BoundaryCondition, BoundaryParams, ConeError, ConeObjective, ConeParams, RequestedCone,
-    Requests, boundary, spread,
+    BoundaryCondition, BoundaryParams, ConeError, ConeObjective, ConeParams, DEFAULT_COUNT,
+    RequestedCone, Requests, boundary, spread,
 };
 use crate::geometry::connectivity::Topology;
 use crate::geometry::ids::{VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
 use moves::Rule;
 use picture::Picture;
-use placement::Placement;
+use placement::{Choice, Placement};
 use quadratic::Limits;
 use quantum::Quanta;
 use std::f64::consts::TAU;
@@ -59,7 +59,13 @@ pub(super) fn select(
     let allowed = allowed(mesh, cones.boundary_distance);
     let places = allowed.iter().filter(|&&a| a).count();
     let least = least_count(limits);
-    let most = cones.count.min(places);
+    let wanted = match (cones.count, condition) {
+        (Some(count), _) => count,
+        (None, BoundaryCondition::Free) => DEFAULT_COUNT,
+        // Whoever asks for a rectangle wants one.
+        (None, _) => least,
+    };
+    let most = wanted.min(places);
     if most < least {
         return Err(match places < least {
             true => ConeError::TooFewVertices {
@@ -67,7 +73,7 @@ pub(super) fn select(
                 interior: places,
             },
             false => ConeError::TooFewCones {
-                count: cones.count,
+                count: wanted,
                 least,
                 total: given.total.unwrap_or(0.0),
             },
@@ -105,12 +111,6 @@ pub(super) fn select(
     if vertices.is_empty() {
         return Ok(Vec::new());
     }
-    placement.correct(&vertices, &curvature);
-    let choice = placement.settle(choice).unwrap_or_else(|choice| choice);
-    if cones.objective == ConeObjective::LogScale {
-        vertices = choice.vertices();
-        curvature.clone_from(&choice.best.curvature);
-    }
     if let Some(quanta) = quanta {
         let no_way = || ConeError::NoQuanta {
             quantum: quanta.size,
@@ -120,17 +120,28 @@ pub(super) fn select(
         (vertices, curvature) =
             quantum::quantise(&mut placement, &choice, quanta, most).ok_or_else(no_way)?;
     }
+    let rule = match quanta {
+        Some(_) => Rule::Fixed,
+        None => Rule::Best(limits),
+    };
     if cones.objective == ConeObjective::AreaDistortion {
-        let rule = match quanta {
-            Some(_) => Rule::Fixed,
-            None => Rule::Best(limits),
-        };
         let mut done = moves::lower_distortion(&mut placement, mesh, &vertices, &curvature, rule);
         if let Some(quanta) = quanta {
             done.curvature = quantum::transfer(placement.points(), &done, quanta);
         }
-        vertices = done.places.iter().map(|p| p.vertex).collect();
-        curvature = done.curvature;
+        (vertices, curvature) = (done.vertices(), done.curvature);
+    }
+    if quanta.is_none() {
+        let objective = cones.objective;
+        (vertices, curvature) = settle(
+            &mut placement,
+            mesh,
+            choice,
+            vertices,
+            curvature,
+            objective,
+            rule,
+        );
     }
     let cone = |(&v, &curvature): (&usize, &f64)| {
         let vertex = VertexId::new(v);
@@ -144,6 +155,41 @@ pub(super) fn select(
     Ok(cones
         .filter(|cone| cone.curvature.abs() > ROUNDING)
         .collect())
+}
+
+/// One more look, with the log scale that the mesh really has in place of that of the linear picture: places and curvatures are improved near
+/// where they are, and kept where the mesh agrees that they are better.
+fn settle(
+    placement: &mut Placement,
+    mesh: &Mesh,
+    choice: Choice,
+    vertices: Vec<usize>,
+    curvature: Vec<f64>,
+    objective: ConeObjective,
+    rule: Rule,
+) -> (Vec<usize>, Vec<f64>) {
+    let real = placement.real_log_scale(&vertices, &curvature);
+    let cost = |placement: &Placement, u: &[f64]| match objective {
+        ConeObjective::LogScale => placement.picture.variance(u),
+        ConeObjective::AreaDistortion => placement.at(u).value(&[], &[]),
+    };
+    let now = cost(placement, &real);
+    placement.correct(&vertices, &curvature, &real);
+    let (moved, c) = match objective {
+        ConeObjective::LogScale => match placement.settle(choice) {
+            Some(choice) => (choice.vertices(), choice.best.curvature),
+            None => return (vertices, curvature),
+        },
+        ConeObjective::AreaDistortion => {
+            let done = moves::settle(placement, mesh, &vertices, &curvature, rule);
+            (done.vertices(), done.curvature)
+        }
+    };
+    let next = placement.real_log_scale(&moved, &c);
+    match cost(placement, &next) < now {
+        true => (moved, c),
+        false => (vertices, curvature),
+    }
 }
 
 fn not_chosen(reason: impl ToString) -> ConeError {

@@ -35,6 +35,8 @@ const TRIALS: usize = 3;
 const STEPS: usize = 12;
 /// First radius of the rings, in square roots of the area.
 const FIRST_RADIUS: f64 = 0.15;
+/// The same where cones are all but placed.
+const LAST_RADIUS: f64 = 0.02;
 
 /// What may become of the curvatures while cones move.
 #[derive(Clone, Copy)]
@@ -63,6 +65,10 @@ pub(super) struct Arrangement {
 }
 
 impl Arrangement {
+    pub(super) fn vertices(&self) -> Vec<usize> {
+        self.places.iter().map(|p| p.vertex).collect()
+    }
+
     pub(super) fn answers(&self) -> Vec<&[f64]> {
         self.places.iter().map(|p| p.answer.as_slice()).collect()
     }
@@ -114,7 +120,7 @@ pub(super) fn lower_distortion(
         base: &base,
     };
     for _ in 0..ROUNDS {
-        now = near(placement, mesh, now, rule);
+        now = near(placement, mesh, now, rule, FIRST_RADIUS);
         let Some(moved) = far(&cells, coarse, &landmarks, &at_landmarks, &now, rule) else {
             break;
         };
@@ -126,7 +132,7 @@ pub(super) fn lower_distortion(
         }
         let start: Vec<f64> = moved.iter().map(|(_, c)| *c).collect();
         let next = arrange(placement, places, &start, rule);
-        let next = near(placement, mesh, next, rule);
+        let next = near(placement, mesh, next, rule, FIRST_RADIUS);
         if next.value > now.value * (1.0 - FAR_GAIN) {
             if next.value < now.value {
                 now = next;
@@ -136,6 +142,19 @@ pub(super) fn lower_distortion(
         now = next;
     }
     now
+}
+
+/// The best curvatures at these places and near them, after u without cones has changed.
+pub(super) fn settle(
+    placement: &mut Placement,
+    mesh: &Mesh,
+    vertices: &[usize],
+    curvature: &[f64],
+    rule: Rule,
+) -> Arrangement {
+    let places = placement.places(vertices);
+    let now = arrange(placement, places, curvature, rule);
+    near(placement, mesh, now, rule, LAST_RADIUS)
 }
 
 fn arrange(
@@ -154,10 +173,16 @@ fn arrange(
 }
 
 impl Placement<'_> {
+    /// The surface with u without cones.
     pub(super) fn points(&self) -> Points<'_> {
+        self.at(&self.base)
+    }
+
+    /// The surface with any u.
+    pub(super) fn at<'u>(&'u self, u: &'u [f64]) -> Points<'u> {
         Points {
             weight: &self.picture.weight,
-            base: &self.base,
+            base: u,
         }
     }
 
@@ -188,7 +213,7 @@ fn far(
     now: &Arrangement,
     rule: Rule,
 ) -> Option<Vec<(usize, f64)>> {
-    let mut vertices: Vec<usize> = now.places.iter().map(|p| p.vertex).collect();
+    let mut vertices = now.vertices();
     let mut answers: Vec<Vec<f64>> = now.places.iter().map(|p| cells.means(&p.answer)).collect();
     let (mut curvature, mut best) = rule.apply(points, &views(&answers), &now.curvature, STEPS);
     let mut moved = false;
@@ -234,9 +259,15 @@ fn views(answers: &[Vec<f64>]) -> Vec<&[f64]> {
 }
 
 /// Moves along the force, in rings that shrink down to the neighbours.
-fn near(placement: &mut Placement, mesh: &Mesh, mut now: Arrangement, rule: Rule) -> Arrangement {
+fn near(
+    placement: &mut Placement,
+    mesh: &Mesh,
+    mut now: Arrangement,
+    rule: Rule,
+    first_radius: f64,
+) -> Arrangement {
     let area = super::picture::total_area(mesh);
-    let mut radius = vec![FIRST_RADIUS * area.sqrt(); now.places.len()];
+    let mut radius = vec![first_radius * area.sqrt(); now.places.len()];
     loop {
         let answers = now.answers();
         let mut force = placement.points().derivative(&answers, &now.curvature);

@@ -21,7 +21,7 @@ impl Placement<'_> {
             let Some(moved) = self.move_pair(&choice, goal) else {
                 break;
             };
-            choice = self.exchange(moved, least_gain);
+            choice = self.exchange(moved, least_gain, false);
         }
         choice
     }
@@ -42,7 +42,7 @@ impl Placement<'_> {
         rest.truncate(PAIRS * count);
         rest.iter().find_map(|rest| {
             let one = self.add(rest)?;
-            let found = self.best_additions(&one).into_iter();
+            let found = self.best_additions(&one, None).into_iter();
             let vertices: Vec<usize> = found.filter(|v| v.1 < goal).map(|v| v.0).collect();
             let two = self.with_one_of(&one.sites, one.sites.len(), &vertices)?;
             (two.energy < goal).then_some(two)

@@ -196,6 +196,13 @@ impl Picture {
         self.weight.iter().zip(field).map(|(w, x)| w * x).sum()
     }
 
+    /// Variance of a field over the surface.
+    pub(super) fn variance(&self, field: &[f64]) -> f64 {
+        let mean = self.mean(field);
+        let squares = self.weight.iter().zip(field);
+        squares.map(|(w, x)| w * (x - mean) * (x - mean)).sum()
+    }
+
     /// Replaces a field by the density of its difference from the mean: ∂/∂u of half the variance.
     pub(super) fn centre(&self, field: &mut [f64]) {
         let mean = self.mean(field);

@@ -36,6 +36,8 @@ const ROUNDS: usize = 3;
 const IDLE: f64 = 0.01;
 /// … and so is every one where it is below this without.
 const NOTHING: f64 = 1e-6;
+/// Share of the energy that may be rounding.
+const ROUNDING: f64 = 1e-7;
 /// Vertices of all searches from a first cone of their own.
 const STARTS: usize = 20_000;
 /// Passes of exchanges over all cones.
@@ -140,24 +142,25 @@ impl<'a> Placement<'a> {
         self.slope = slope;
     }
 
-    /// Counts u from now on from what the mesh really does with these cones: adds to u without cones the difference between the mesh's own log
-    /// scale and that of the linear picture.
-    pub(super) fn correct(&mut self, vertices: &[usize], curvature: &[f64]) {
+    /// The log scale that the mesh itself has with these cones.
+    pub(super) fn real_log_scale(&mut self, vertices: &[usize], curvature: &[f64]) -> Vec<f64> {
         let cones = || vertices.iter().zip(curvature);
         let linear = self.log_scale_of(cones());
         let mut target: Vec<f64> = self.background.clone();
         self.add_cones(&mut target, cones());
         let own = target.iter_mut().zip(&self.picture.curvature);
         own.for_each(|(t, k)| *t += k);
-        let real = self.picture.corrected(&linear, &target);
-        if real.iter().all(|u| u.is_finite()) {
-            let difference = real.iter().zip(&linear).map(|(r, l)| r - l);
-            self.base
-                .iter_mut()
-                .zip(difference)
-                .for_each(|(b, d)| *b += d);
-            self.weigh_base();
-        }
+        self.picture.corrected(&linear, &target)
+    }
+
+    /// Counts from now on from what the mesh really does with these cones: adds to u without cones the difference between `real` and the linear
+    /// picture.
+    pub(super) fn correct(&mut self, vertices: &[usize], curvature: &[f64], real: &[f64]) {
+        let linear = self.log_scale_of(vertices.iter().zip(curvature));
+        let difference = real.iter().zip(&linear).map(|(r, l)| r - l);
+        let base = self.base.iter_mut().zip(difference);
+        base.for_each(|(b, d)| *b += d);
+        self.weigh_base();
     }
 
     fn add_cones<'c>(&self, field: &mut [f64], cones: impl Iterator<Item = (&'c usize, &'c f64)>) {
@@ -266,11 +269,11 @@ impl<'a> Placement<'a> {
         }
     }
 
-    /// Vertices that are worth most beside `choice`, and the variance that each promises at the least.
+    /// Vertices that are worth most beside `choice`, and the variance that each promises at the least; near a vertex, or anywhere.
     ///
     /// Where curvatures are at a limit, two are named: one for cones that stay there, and one for cones that need not, because the new one
     /// relieves them. The second matters most where too few cones must make up the total and all are at their limits.
-    pub(super) fn best_additions(&self, choice: &Choice) -> Vec<(usize, f64)> {
+    pub(super) fn best_additions(&self, choice: &Choice, from: Option<usize>) -> Vec<(usize, f64)> {
         let mut found: Vec<(usize, f64)> = Vec::new();
         if choice.best.is_inside.iter().any(|inside| !inside) {
             let unlimited = Limits {
@@ -278,9 +281,9 @@ impl<'a> Placement<'a> {
                 ..self.limits
             };
             let relieved = self.program(&choice.sites).minimise(unlimited);
-            found.extend(relieved.and_then(|best| self.best_beside(&choice.sites, &best)));
+            found.extend(relieved.and_then(|best| self.best_beside(&choice.sites, &best, from)));
         }
-        if let Some(other) = self.best_beside(&choice.sites, &choice.best)
+        if let Some(other) = self.best_beside(&choice.sites, &choice.best, from)
             && found.iter().all(|one| one.0 != other.0)
         {
             found.push(other);
@@ -289,7 +292,12 @@ impl<'a> Placement<'a> {
     }
 
     /// The vertex that is worth most beside cones of given curvatures, and the variance that it promises.
-    fn best_beside(&self, sites: &[Site], chosen: &Best) -> Option<(usize, f64)> {
+    fn best_beside(
+        &self,
+        sites: &[Site],
+        chosen: &Best,
+        from: Option<usize>,
+    ) -> Option<(usize, f64)> {
         let has_total = self.limits.total.is_some();
         let inside: Vec<usize> = (0..sites.len()).filter(|&i| chosen.is_inside[i]).collect();
         let system = self
@@ -322,18 +330,22 @@ impl<'a> Placement<'a> {
                 false => -c * (2.0 * e + c * s),
             }
         };
-        let best = self.climb(taken, gain)?;
+        let best = self.climb(from, taken, gain)?;
         Some((best.0, self.base_energy + chosen.energy - best.1))
     }
 
-    /// The vertex worth most: the best of the samples, and from there uphill. `worth` gets a buffer of its own.
+    /// The vertex worth most: uphill from one vertex, or from the best of the samples. `worth` gets a buffer of its own.
     pub(super) fn climb(
         &self,
+        from: Option<usize>,
         taken: impl Fn(usize) -> bool + Sync,
         worth: impl Fn(usize, &mut Vec<f64>) -> f64 + Sync,
     ) -> Option<(usize, f64)> {
-        let scored: Vec<(usize, f64)> = self
-            .samples
+        let starts = match &from {
+            Some(vertex) => std::slice::from_ref(vertex),
+            None => &self.samples,
+        };
+        let scored: Vec<(usize, f64)> = starts
             .par_iter()
             .with_min_len(PIECE)
             .filter(|&&v| !taken(v))
@@ -390,7 +402,11 @@ impl<'a> Placement<'a> {
 
     /// Adds the best vertex; `None` where nothing can be added.
     pub(super) fn add(&mut self, choice: &Choice) -> Option<Choice> {
-        let vertices: Vec<usize> = self.best_additions(choice).iter().map(|v| v.0).collect();
+        let vertices: Vec<usize> = self
+            .best_additions(choice, None)
+            .iter()
+            .map(|v| v.0)
+            .collect();
         self.with_one_of(&choice.sites, choice.sites.len(), &vertices)
     }
 
@@ -401,16 +417,18 @@ impl<'a> Placement<'a> {
         self.choose(sites)
     }
 
-    /// Moves cones one by one to where they are worth most, until none gains more than `least_gain` of the energy.
-    pub(super) fn exchange(&mut self, mut choice: Choice, least_gain: f64) -> Choice {
+    /// Moves cones one by one to where they are worth most, anywhere or (`nearby`) uphill from where they are, until none gains more than
+    /// `least_gain` of the energy.
+    pub(super) fn exchange(&mut self, mut choice: Choice, least_gain: f64, nearby: bool) -> Choice {
         let count = choice.sites.len();
         // Cones that stayed where they were since anything moved.
         let (mut stayed, mut next) = (0, 0);
         let mut looked = 0;
         while stayed < count && looked < PASSES * count {
             looked += 1;
+            let from = nearby.then(|| choice.sites[next].vertex);
             let moved = self.without(&choice, next).and_then(|rest| {
-                let vertices = self.best_additions(&rest).into_iter();
+                let vertices = self.best_additions(&rest, from).into_iter();
                 let vertices: Vec<usize> = vertices
                     .filter(|v| v.1 <= choice.energy * (1.0 - least_gain))
                     .map(|v| v.0)
@@ -443,7 +461,7 @@ impl<'a> Placement<'a> {
             let Some(fewer) = self.prune(more, count) else {
                 break;
             };
-            let other = self.exchange(fewer, COARSE_GAIN);
+            let other = self.exchange(fewer, COARSE_GAIN, false);
             let gained = choice.energy - other.energy;
             let go_on = gained > COARSE_GAIN * choice.energy;
             if gained > 0.0 {
@@ -454,7 +472,7 @@ impl<'a> Placement<'a> {
             }
         }
         choice = self.exchange_pairs(choice, COARSE_GAIN);
-        Some(self.exchange(choice, FINE_GAIN))
+        Some(self.exchange(choice, FINE_GAIN, false))
     }
 
     /// From nothing to cones that no single move improves much. On a small mesh, where that is cheap, the first cone is put at several places
@@ -473,8 +491,10 @@ impl<'a> Placement<'a> {
                 continue;
             };
             let start = self.grow(start, count);
-            let choice = self.exchange(start, COARSE_GAIN);
-            if best.as_ref().is_none_or(|b| choice.energy < b.energy) {
+            let choice = self.exchange(start, COARSE_GAIN, false);
+            // Starts that end at the same places differ by rounding.
+            let is_better = |b: &Choice| choice.energy < b.energy * (1.0 - ROUNDING);
+            if best.as_ref().is_none_or(is_better) {
                 best = Some(choice);
             }
         }
@@ -498,12 +518,10 @@ impl<'a> Placement<'a> {
         Some(choice)
     }
 
-    /// The same places and their neighbourhood weighed anew, after u without cones has changed. The old choice where that fails.
-    pub(super) fn settle(&mut self, choice: Choice) -> Result<Choice, Choice> {
-        match self.choose(choice.sites.clone()) {
-            Some(weighed) => Ok(self.exchange(weighed, FINE_GAIN)),
-            None => Err(choice),
-        }
+    /// The best curvatures at these places and near them, after u without cones has changed.
+    pub(super) fn settle(&mut self, choice: Choice) -> Option<Choice> {
+        let weighed = self.choose(choice.sites)?;
+        Some(self.exchange(weighed, FINE_GAIN, true))
     }
 
     /// Takes away cones that do not pay, as long as more than `least` are left: those without which the standard deviation of the log
@@ -532,9 +550,9 @@ impl<'a> Placement<'a> {
         let mut choice = self.search(least)?;
         while self.largest_deviation(&choice) > bound && choice.sites.len() < most {
             let Some(more) = self.add(&choice) else { break };
-            choice = self.exchange(more, COARSE_GAIN);
+            choice = self.exchange(more, COARSE_GAIN, false);
         }
-        Some(self.exchange(choice, FINE_GAIN))
+        Some(self.exchange(choice, FINE_GAIN, false))
     }
 
     /// max |u − mean| over the faces, u of a face being that of its corners on average.

@@ -217,7 +217,7 @@ fn best_place(
                 -c * (2.0 * e + c * placement.self_energy[v])
             };
             let taken = |v: usize| !placement.allowed[v] || others.iter().any(|s| s.vertex == v);
-            let (vertex, gain) = placement.climb(taken, worth)?;
+            let (vertex, gain) = placement.climb(None, taken, worth)?;
             Some((vertex, k, rest - gain))
         })
         .reduce(|a, b| if b.2 < a.2 { b } else { a })
