@@ -4,7 +4,7 @@ use crate::models::{self, Chosen};
 use affine_atlas::flow::cones::{BoundaryCondition, ConeObjective, ConeParams};
 use affine_atlas::flow::solve::SymmetricSolver;
 use affine_atlas::geometry::ids::VertexId;
-use affine_atlas::geometry::mesh::{Mesh, triangle_area};
+use affine_atlas::geometry::mesh::Mesh;
 use affine_atlas::geometry::triangle;
 use std::path::Path;
 
@@ -26,11 +26,13 @@ pub fn prediction(file: &Path) -> Result<(), String> {
             ..ConeParams::default()
         };
         let (given, _) = models::choose(&mesh, &params, BoundaryCondition::Free)?;
-        let truth = models::distortion(&mesh, &given)?.std;
+        let truth = models::flow(&mesh, &given)?.log_scale;
+        let truth = models::deviation(&mesh, truth.as_slice());
+        let faces = models::distortion(&mesh, &given)?.std;
         let predicted = predict(&mesh, given.target.as_slice())?;
         let off = predicted / truth - 1.0;
         println!(
-            "{count}: {predicted:.4} predicted, {truth:.4} true, {:.1} % off",
+            "{count}: {predicted:.4} predicted, {truth:.4} true, {faces:.4} over faces, {:.1} % off",
             100.0 * off
         );
         if off.abs() > PREDICTED {
@@ -83,17 +85,7 @@ fn predict(mesh: &Mesh, target: &[f64]) -> Result<f64, String> {
         .map_err(|e| e.to_string())?;
     solver.solve(&mut right);
     right.push(0.0);
-    let (mut total, mut mean, mut square) = (0.0, 0.0, 0.0);
-    for f in mesh.connectivity.faces() {
-        let share = triangle_area(mesh.face_positions(f)) / 3.0;
-        for v in mesh.connectivity.face_vertices(f) {
-            let u = right[v.index()];
-            total += share;
-            mean += share * u;
-            square += share * u * u;
-        }
-    }
-    Ok((square / total - (mean / total).powi(2)).sqrt())
+    Ok(models::deviation(mesh, &right))
 }
 
 /// Moving curvature from one cone to the next gains nothing to speak of: the choice is at a least value of what it was to make least, in

@@ -130,6 +130,22 @@ pub fn distortion(mesh: &Mesh, prescription: &Prescription) -> Result<Distortion
     Ok(Distortion { area, std })
 }
 
+/// Standard deviation over the area of a number at each vertex.
+pub fn deviation(mesh: &Mesh, u: &[f64]) -> f64 {
+    let c = &mesh.connectivity;
+    let (mut total, mut mean, mut square) = (0.0, 0.0, 0.0);
+    for f in c.faces() {
+        let share = triangle_area(mesh.face_positions(f)) / 3.0;
+        for v in c.face_vertices(f) {
+            let u = u[v.index()];
+            total += share;
+            mean += share * u;
+            square += share * u * u;
+        }
+    }
+    (square / total - (mean / total).powi(2)).max(0.0).sqrt()
+}
+
 /// The finished atlas of the one component.
 pub fn finished(triangles: &Triangles, cones: ConeParams) -> Result<AffineAtlas, String> {
     let config = Config {

@@ -2,7 +2,7 @@
 
 use crate::common::Triangles;
 use crate::dense::Matrix;
-use crate::models::{self, Random, distance};
+use crate::models::{self, Chosen, Random, distance};
 use crate::symmetry::octahedron;
 use affine_atlas::flow::cones::{BoundaryCondition, ConeParams, ConeStrategy};
 use affine_atlas::geometry::ids::{EdgeVec, VertexId};
@@ -10,8 +10,10 @@ use affine_atlas::geometry::mesh::{Mesh, triangle_area};
 use affine_atlas::geometry::triangle;
 use std::f64::consts::{PI, TAU};
 
-/// What is asked for: the variance of the choice over the least.
+/// What is asked for: the standard deviation of the choice over the least.
 const EXCESS: f64 = 1.05;
+/// Choices whose metric is looked at.
+const KEPT: usize = 12;
 /// Shapes of each kind.
 const SEEDS: u64 = 12;
 
@@ -30,7 +32,7 @@ pub enum Shape {
 
 pub const SHAPES: [Shape; 4] = [Shape::Ball, Shape::Torus, Shape::FreeHill, Shape::EvenHill];
 
-/// The selected cones are as good as the best subset of the same size, its curvatures the best for it.
+/// The selected cones are as good as the best subset of the same size, found in the linear picture and told apart by the flow itself.
 pub fn brute_force(shape: Shape) -> Result<(), String> {
     let condition = match shape {
         Shape::EvenHill => BoundaryCondition::Uniform,
@@ -58,24 +60,36 @@ pub fn brute_force(shape: Shape) -> Result<(), String> {
             for (v, k) in &chosen {
                 all[*v as usize] = *k;
             }
-            let ours = energy.of(&all);
+            let linear = energy.of(&all);
+            let ours = real_variance(&mesh, &chosen, condition)?;
             let range = [
                 params.min_curvature.radians(),
                 params.max_curvature.radians(),
             ];
-            let (least, best) = energy.least(&energy.interior, count, range);
-            let ratio = ours / least;
+            // The best few of the linear picture, by what the flow makes of them.
+            let ranked = energy.ranked(&energy.interior, count, range);
+            if chosen.len() == count && linear < ranked[0].0 * (1.0 - 1e-6) {
+                return Err(format!(
+                    "{shape:?} {seed}, {count}: {linear} below the least {}",
+                    ranked[0].0
+                ));
+            }
+            let mut best = (f64::INFINITY, Vec::new());
+            for (_, cones) in ranked {
+                let cones: Vec<_> = cones.into_iter().map(|(v, k)| (v as u32, k)).collect();
+                let variance = real_variance(&mesh, &cones, condition)?;
+                if variance < best.0 {
+                    best = (variance, cones);
+                }
+            }
+            let ratio = (ours / best.0).sqrt();
             looked += 1;
             hits += usize::from(ratio < 1.0 + 1e-9);
             worst = worst.max(ratio);
-            if ratio < 1.0 - 1e-6 {
-                return Err(format!(
-                    "{shape:?} {seed}, {count}: {ours} below the least {least}"
-                ));
-            }
             if ratio > EXCESS {
                 failed.push(format!(
-                    "{shape:?} {seed}, {count}: {ours:.5} with {chosen:.3?}, {least:.5} with {best:.3?}"
+                    "{shape:?} {seed}, {count}: {ours:.5} with {chosen:.3?}, {:.5} with {:.3?}",
+                    best.0, best.1
                 ));
             }
         }
@@ -88,6 +102,19 @@ pub fn brute_force(shape: Shape) -> Result<(), String> {
         true => Ok(()),
         false => Err(failed.join("\n")),
     }
+}
+
+/// Variance in the linear picture, and the cones.
+type Ranked = (f64, Vec<(usize, f64)>);
+
+/// Variance over the area of the u that the flow finds.
+fn real_variance(
+    mesh: &Mesh,
+    chosen: &[Chosen],
+    condition: BoundaryCondition,
+) -> Result<f64, String> {
+    let metric = models::flow(mesh, &models::prescribe(mesh, chosen, condition)?)?;
+    Ok(models::deviation(mesh, metric.log_scale.as_slice()).powi(2))
 }
 
 /// Variance of u as a quadratic function of the curvature of the interior vertices.
@@ -232,15 +259,17 @@ impl Energy {
         self.constant + terms.map(|((c, b), m)| c * (2.0 * b + m)).sum::<f64>()
     }
 
-    /// The least variance with cones at `count` of `places`, and where.
-    fn least(&self, places: &[usize], count: usize, range: [f64; 2]) -> (f64, Vec<(usize, f64)>) {
-        let mut best = (f64::INFINITY, Vec::new());
+    /// The choices of `count` of `places` with the least variance, the best first.
+    fn ranked(&self, places: &[usize], count: usize, range: [f64; 2]) -> Vec<Ranked> {
+        let mut best: Vec<Ranked> = Vec::new();
         let mut subset: Vec<usize> = (0..count).collect();
         loop {
             let sites: Vec<usize> = subset.iter().map(|&i| places[i]).collect();
             if let Some((energy, c)) = self.curvatures(&sites, range) {
-                if energy < best.0 {
-                    best = (energy, sites.into_iter().zip(c).collect());
+                let at = best.partition_point(|b| b.0 <= energy);
+                if at < KEPT {
+                    best.insert(at, (energy, sites.into_iter().zip(c).collect()));
+                    best.truncate(KEPT);
                 }
             }
             let last = (0..count)

@@ -19,6 +19,7 @@
 
 mod area;
 mod moves;
+mod pairs;
 mod picture;
 mod placement;
 mod quadratic;

@@ -23,6 +23,8 @@ use crate::flow::solve::solve_dense;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::VertexId;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Share of the energy that an exchange must gain while the search looks for the right part of the surface …
 const COARSE_GAIN: f64 = 1e-2;
@@ -34,12 +36,18 @@ const ROUNDS: usize = 3;
 const IDLE: f64 = 0.01;
 /// … and so is every one where it is below this without.
 const NOTHING: f64 = 1e-6;
+/// Share of the energy that may be rounding.
+const ROUNDING: f64 = 1e-7;
+/// Vertices of all searches from a first cone of their own.
+const STARTS: usize = 20_000;
 /// Passes of exchanges over all cones.
 const PASSES: usize = 12;
 /// Vertices that are looked at everywhere; from the best of them the search climbs to a vertex that is better than its neighbours.
 const SAMPLES: usize = 2000;
 /// Samples to climb from.
 const SUMMITS: usize = 6;
+/// Numbers in the columns that are kept.
+const KNOWN: usize = 1 << 25;
 /// Samples a thread looks at in one go.
 const PIECE: usize = 256;
 
@@ -64,13 +72,15 @@ pub(super) struct Placement<'a> {
     pub(super) self_energy: Vec<f64>,
     /// Where the search begins.
     pub(super) samples: Vec<usize>,
+    /// Columns of B that were computed: the search comes back to the same places again and again.
+    known: BTreeMap<usize, Arc<[f64]>>,
 }
 
 /// A vertex with its column of B.
 #[derive(Clone)]
 pub(super) struct Site {
     pub(super) vertex: usize,
-    column: Vec<f64>,
+    column: Arc<[f64]>,
 }
 
 /// Chosen places and their best curvatures.
@@ -118,6 +128,7 @@ impl<'a> Placement<'a> {
             sink,
             limits,
             allowed,
+            known: BTreeMap::new(),
         };
         placement.weigh_base();
         placement
@@ -212,17 +223,27 @@ impl<'a> Placement<'a> {
 
     /// Columns of B.
     pub(super) fn sites(&mut self, vertices: &[usize]) -> Vec<Site> {
-        let mut fields = self.responses(vertices);
         let n = self.len();
+        if (self.known.len() + vertices.len()) * n > KNOWN {
+            self.known.clear();
+        }
+        let mut new: Vec<usize> = vertices.to_vec();
+        new.retain(|v| !self.known.contains_key(v));
+        new.sort_unstable();
+        new.dedup();
+        let mut fields = self.responses(&new);
         for field in fields.chunks_mut(n) {
             self.picture.centre(field);
         }
         self.dual(&mut fields);
-        let columns = fields.chunks(n).map(<[f64]>::to_vec);
-        let sites = vertices.iter().zip(columns);
-        sites
-            .map(|(&vertex, column)| Site { vertex, column })
-            .collect()
+        let columns = new.iter().zip(fields.chunks(n));
+        self.known
+            .extend(columns.map(|(&v, column)| (v, Arc::from(column))));
+        let site = |&vertex: &usize| {
+            let column = self.known.get(&vertex)?.clone();
+            Some(Site { vertex, column })
+        };
+        vertices.iter().filter_map(site).collect()
     }
 
     /// The best curvatures at given places; `None` where the places are too close to each other to tell them apart.
@@ -252,7 +273,7 @@ impl<'a> Placement<'a> {
     ///
     /// Where curvatures are at a limit, two are named: one for cones that stay there, and one for cones that need not, because the new one
     /// relieves them. The second matters most where too few cones must make up the total and all are at their limits.
-    fn best_additions(&self, choice: &Choice, from: Option<usize>) -> Vec<(usize, f64)> {
+    pub(super) fn best_additions(&self, choice: &Choice, from: Option<usize>) -> Vec<(usize, f64)> {
         let mut found: Vec<(usize, f64)> = Vec::new();
         if choice.best.is_inside.iter().any(|inside| !inside) {
             let unlimited = Limits {
@@ -364,7 +385,12 @@ impl<'a> Placement<'a> {
     }
 
     /// The best of `sites` with one of some vertices put at a place of the list.
-    fn with_one_of(&mut self, sites: &[Site], at: usize, vertices: &[usize]) -> Option<Choice> {
+    pub(super) fn with_one_of(
+        &mut self,
+        sites: &[Site],
+        at: usize,
+        vertices: &[usize],
+    ) -> Option<Choice> {
         let new = self.sites(vertices);
         let choices = new.into_iter().filter_map(|site| {
             let mut sites = sites.to_vec();
@@ -393,7 +419,7 @@ impl<'a> Placement<'a> {
 
     /// Moves cones one by one to where they are worth most, anywhere or (`nearby`) uphill from where they are, until none gains more than
     /// `least_gain` of the energy.
-    fn exchange(&mut self, mut choice: Choice, least_gain: f64, nearby: bool) -> Choice {
+    pub(super) fn exchange(&mut self, mut choice: Choice, least_gain: f64, nearby: bool) -> Choice {
         let count = choice.sites.len();
         // Cones that stayed where they were since anything moved.
         let (mut stayed, mut next) = (0, 0);
@@ -429,9 +455,7 @@ impl<'a> Placement<'a> {
         if count == 0 {
             return self.choose(Vec::new());
         }
-        let start = self.choose(Vec::new())?;
-        let start = self.grow(start, count);
-        let mut choice = self.exchange(start, COARSE_GAIN, false);
+        let mut choice = self.first_choice(count)?;
         for _ in 0..ROUNDS {
             let more = self.grow(choice.clone(), 2 * count.max(2));
             let Some(fewer) = self.prune(more, count) else {
@@ -447,7 +471,34 @@ impl<'a> Placement<'a> {
                 break;
             }
         }
+        choice = self.exchange_pairs(choice, COARSE_GAIN);
         Some(self.exchange(choice, FINE_GAIN, false))
+    }
+
+    /// From nothing to cones that no single move improves much. On a small mesh, where that is cheap, the first cone is put at several places
+    /// in turn.
+    fn first_choice(&mut self, count: usize) -> Option<Choice> {
+        let starts = (STARTS / self.len().max(1)).min(self.samples.len());
+        let step = self.samples.len().div_ceil(starts.max(1)).max(1);
+        let firsts = self.samples.iter().copied().step_by(step).take(starts);
+        let mut starts = vec![Vec::new()];
+        for first in firsts.collect::<Vec<usize>>() {
+            starts.push(self.sites(&[first]));
+        }
+        let mut best: Option<Choice> = None;
+        for start in starts {
+            let Some(start) = self.choose(start) else {
+                continue;
+            };
+            let start = self.grow(start, count);
+            let choice = self.exchange(start, COARSE_GAIN, false);
+            // Starts that end at the same places differ by rounding.
+            let is_better = |b: &Choice| choice.energy < b.energy * (1.0 - ROUNDING);
+            if best.as_ref().is_none_or(is_better) {
+                best = Some(choice);
+            }
+        }
+        best
     }
 
     /// Adds the best vertex again and again.
