@@ -39,6 +39,8 @@ use quadratic::Limits;
 use quantum::Quanta;
 use std::f64::consts::TAU;
 
+/// Variances of the log scale up to this factor of the least count as hardly more.
+const NEAR_COST: f64 = 1.4;
 /// Curvatures in excess of a limit that are rounding, radians.
 const ROUNDING: f64 = 1e-9;
 
@@ -112,16 +114,12 @@ pub(super) fn select(
         Some(quanta) => quanta.caps(most),
         None => vec![limits],
     };
-    let mut best: Option<Found> = None;
+    let mut found = Vec::new();
     for limits in caps {
         placement.limits = limits;
-        let Some(found) = search.run(&mut placement)? else {
-            continue;
-        };
-        if best.as_ref().is_none_or(|best| found.cost < best.cost) {
-            best = Some(found);
-        }
+        found.extend(search.run(&mut placement)?);
     }
+    let best = cheapest(found);
     let Some(Found {
         vertices,
         curvature,
@@ -157,16 +155,27 @@ struct Search<'a> {
     quanta: Option<Quanta>,
 }
 
-/// Cones, and what they cost by the objective.
+/// Cones, and what they cost.
 struct Found {
     vertices: Vec<usize>,
     curvature: Vec<f64>,
+    /// By the objective.
     cost: f64,
+    /// ln of (9) + 1, in the linear picture; 0 where there is nothing to compare with.
+    distortion: f64,
+}
+
+/// The choice that costs least; of those that cost hardly more, the one of least distortion. Among whole quanta a little of the one buys much of
+/// the other: a cone of 3/2 π instead of three of π/2 makes (9) many times as large.
+fn cheapest(found: Vec<Found>) -> Option<Found> {
+    let least = found.iter().map(|f| f.cost).fold(f64::INFINITY, f64::min);
+    let near = found.into_iter().filter(|f| f.cost <= least * NEAR_COST);
+    near.reduce(|a, b| if b.distortion < a.distortion { b } else { a })
 }
 
 impl Search<'_> {
     /// The best cones within the limits of the placement; `None` where no whole quanta meet the total.
-    fn run(&self, placement: &mut Placement) -> Result<Option<Found>, ConeError> {
+    fn run(&self, placement: &mut Placement) -> Result<Vec<Found>, ConeError> {
         let choice = match self.cones.log_scale_bound {
             Some(bound) => placement.search_bounded(self.least, self.most, bound),
             None => placement.search(self.most),
@@ -177,20 +186,14 @@ impl Search<'_> {
             vertices: choice.vertices(),
             curvature: choice.best.curvature.clone(),
             cost: choice.energy,
+            distortion: 0.0,
         };
         if found.vertices.is_empty() {
-            return Ok(Some(found));
+            return Ok(vec![found]);
         }
         let objective = self.cones.objective;
         if let Some(quanta) = self.quanta {
-            let Some(rounded) = quantum::quantise(placement, &choice, quanta, self.most) else {
-                return Ok(None);
-            };
-            found = rounded;
-            if objective == ConeObjective::AreaDistortion {
-                found = quantum::lower_distortion(placement, self.mesh, found, quanta);
-            }
-            return Ok(Some(found));
+            return Ok(self.in_quanta(placement, &choice, quanta));
         }
         let rule = Rule::Best(placement.limits);
         if objective == ConeObjective::AreaDistortion {
@@ -198,7 +201,26 @@ impl Search<'_> {
             found =
                 moves::lower_distortion(placement, self.mesh, vertices, curvature, rule).found();
         }
-        Ok(Some(self.settle(placement, choice, found, rule)))
+        Ok(vec![self.settle(placement, choice, found, rule)])
+    }
+
+    /// Whole quanta from a choice, and from the same without some of its cones, in whose stead others appear.
+    fn in_quanta(&self, placement: &mut Placement, choice: &Choice, quanta: Quanta) -> Vec<Found> {
+        let count = choice.sites.len();
+        let mut found = Vec::new();
+        for fewer in [0, 1, count / 4, count / 2] {
+            let start = placement.prune(choice.clone(), count - fewer.min(count));
+            let whole = start.and_then(|s| quantum::quantise(placement, &s, quanta, self.most));
+            let Some(mut whole) = whole else { continue };
+            if self.cones.objective == ConeObjective::AreaDistortion {
+                whole = quantum::lower_distortion(placement, self.mesh, whole, quanta);
+            } else {
+                let u = placement.log_scale_of(whole.vertices.iter().zip(&whole.curvature));
+                whole.distortion = placement.at(&u).value(&[], &[]);
+            }
+            found.push(whole);
+        }
+        found
     }
 
     /// One more look, with the log scale that the mesh really has in place of that of the linear picture: places and curvatures are improved
@@ -219,6 +241,7 @@ impl Search<'_> {
                     vertices: choice.vertices(),
                     curvature: choice.best.curvature,
                     cost: now,
+                    distortion: 0.0,
                 },
                 None => return found,
             },

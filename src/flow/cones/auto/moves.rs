@@ -71,6 +71,7 @@ impl Arrangement {
             vertices: self.vertices(),
             curvature: self.curvature,
             cost: self.value,
+            distortion: 0.0,
         }
     }
 

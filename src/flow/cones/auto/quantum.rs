@@ -210,6 +210,7 @@ pub(super) fn quantise(
         vertices,
         curvature,
         cost: energy,
+        distortion: 0.0,
     })
 }
 
