@@ -124,7 +124,7 @@ fn measure(
     println!(
         "| {name} | {} | {placed} of {} | {:?} | {:.2} s, {:.2} s | {:.2} s, {:.2} s | {:.2}, {:.2} |",
         mesh.connectivity.vertex_count(),
-        params.count.unwrap_or_default(),
+        params.count.unwrap_or(0),
         params.objective,
         choice.cpu,
         choice.clock,

@@ -271,7 +271,7 @@ pub const KEYS: &[Key] = &[
             below: 2.0,
         },
         "multiples of π",
-        "\"3/2\"",
+        "\"5/4\"",
     ),
     key(
         "cones.boundary_distance",

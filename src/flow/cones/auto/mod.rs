@@ -100,49 +100,40 @@ pub(super) fn select(
     }
     let c = &mesh.connectivity;
     let mut placement = Placement::new(&mut picture, c, background, sink, limits, allowed);
-    let choice = match cones.log_scale_bound {
-        Some(bound) => placement.search_bounded(least, most, bound),
-        None => placement.search(most),
+    let search = Search {
+        mesh,
+        cones,
+        least,
+        most,
+        quanta,
     };
-    let choice = choice.ok_or_else(|| not_chosen("the places for cones cannot be told apart"))?;
-    let choice = placement.drop_idle(choice, least);
-    let mut vertices = choice.vertices();
-    let mut curvature = choice.best.curvature.clone();
-    if vertices.is_empty() {
-        return Ok(Vec::new());
+    // Where curvatures are quanta, many small ones and a few large ones are different surfaces: each greatest number is tried.
+    let caps = match quanta {
+        Some(quanta) => quanta.caps(most),
+        None => vec![limits],
+    };
+    let mut best: Option<Found> = None;
+    for limits in caps {
+        placement.limits = limits;
+        let Some(found) = search.run(&mut placement)? else {
+            continue;
+        };
+        if best.as_ref().is_none_or(|best| found.cost < best.cost) {
+            best = Some(found);
+        }
     }
-    if let Some(quanta) = quanta {
-        let no_way = || ConeError::NoQuanta {
-            quantum: quanta.size,
+    let Some(Found {
+        vertices,
+        curvature,
+        ..
+    }) = best
+    else {
+        return Err(ConeError::NoQuanta {
+            quantum: cones.quantum.radians(),
             total: given.total.unwrap_or(0.0),
             count: most,
-        };
-        (vertices, curvature) =
-            quantum::quantise(&mut placement, &choice, quanta, most).ok_or_else(no_way)?;
-    }
-    let rule = match quanta {
-        Some(_) => Rule::Fixed,
-        None => Rule::Best(limits),
+        });
     };
-    if cones.objective == ConeObjective::AreaDistortion {
-        let mut done = moves::lower_distortion(&mut placement, mesh, &vertices, &curvature, rule);
-        if let Some(quanta) = quanta {
-            done.curvature = quantum::transfer(placement.points(), &done, quanta);
-        }
-        (vertices, curvature) = (done.vertices(), done.curvature);
-    }
-    if quanta.is_none() {
-        let objective = cones.objective;
-        (vertices, curvature) = settle(
-            &mut placement,
-            mesh,
-            choice,
-            vertices,
-            curvature,
-            objective,
-            rule,
-        );
-    }
     let cone = |(&v, &curvature): (&usize, &f64)| {
         let vertex = VertexId::new(v);
         RequestedCone {
@@ -157,38 +148,87 @@ pub(super) fn select(
         .collect())
 }
 
-/// One more look, with the log scale that the mesh really has in place of that of the linear picture: places and curvatures are improved near
-/// where they are, and kept where the mesh agrees that they are better.
-fn settle(
-    placement: &mut Placement,
-    mesh: &Mesh,
-    choice: Choice,
+/// What is searched for.
+struct Search<'a> {
+    mesh: &'a Mesh,
+    cones: &'a ConeParams,
+    least: usize,
+    most: usize,
+    quanta: Option<Quanta>,
+}
+
+/// Cones, and what they cost by the objective.
+struct Found {
     vertices: Vec<usize>,
     curvature: Vec<f64>,
-    objective: ConeObjective,
-    rule: Rule,
-) -> (Vec<usize>, Vec<f64>) {
-    let real = placement.real_log_scale(&vertices, &curvature);
-    let cost = |placement: &Placement, u: &[f64]| match objective {
-        ConeObjective::LogScale => placement.picture.variance(u),
-        ConeObjective::AreaDistortion => placement.at(u).value(&[], &[]),
-    };
-    let now = cost(placement, &real);
-    placement.correct(&vertices, &curvature, &real);
-    let (moved, c) = match objective {
-        ConeObjective::LogScale => match placement.settle(choice) {
-            Some(choice) => (choice.vertices(), choice.best.curvature),
-            None => return (vertices, curvature),
-        },
-        ConeObjective::AreaDistortion => {
-            let done = moves::settle(placement, mesh, &vertices, &curvature, rule);
-            (done.vertices(), done.curvature)
+    cost: f64,
+}
+
+impl Search<'_> {
+    /// The best cones within the limits of the placement; `None` where no whole quanta meet the total.
+    fn run(&self, placement: &mut Placement) -> Result<Option<Found>, ConeError> {
+        let choice = match self.cones.log_scale_bound {
+            Some(bound) => placement.search_bounded(self.least, self.most, bound),
+            None => placement.search(self.most),
+        };
+        let choice = choice.ok_or_else(|| not_chosen("places for cones cannot be told apart"))?;
+        let choice = placement.drop_idle(choice, self.least);
+        let mut found = Found {
+            vertices: choice.vertices(),
+            curvature: choice.best.curvature.clone(),
+            cost: choice.energy,
+        };
+        if found.vertices.is_empty() {
+            return Ok(Some(found));
         }
-    };
-    let next = placement.real_log_scale(&moved, &c);
-    match cost(placement, &next) < now {
-        true => (moved, c),
-        false => (vertices, curvature),
+        let objective = self.cones.objective;
+        if let Some(quanta) = self.quanta {
+            let Some(rounded) = quantum::quantise(placement, &choice, quanta, self.most) else {
+                return Ok(None);
+            };
+            found = rounded;
+            if objective == ConeObjective::AreaDistortion {
+                found = quantum::lower_distortion(placement, self.mesh, found, quanta);
+            }
+            return Ok(Some(found));
+        }
+        let rule = Rule::Best(placement.limits);
+        if objective == ConeObjective::AreaDistortion {
+            let (vertices, curvature) = (&found.vertices, &found.curvature);
+            found =
+                moves::lower_distortion(placement, self.mesh, vertices, curvature, rule).found();
+        }
+        Ok(Some(self.settle(placement, choice, found, rule)))
+    }
+
+    /// One more look, with the log scale that the mesh really has in place of that of the linear picture: places and curvatures are improved
+    /// near where they are, and kept where the mesh agrees that they are better.
+    fn settle(&self, placement: &mut Placement, choice: Choice, found: Found, rule: Rule) -> Found {
+        let objective = self.cones.objective;
+        let cost = |placement: &Placement, u: &[f64]| match objective {
+            ConeObjective::LogScale => placement.picture.variance(u),
+            ConeObjective::AreaDistortion => placement.at(u).value(&[], &[]),
+        };
+        let (vertices, curvature) = (&found.vertices, &found.curvature);
+        let real = placement.real_log_scale(vertices, curvature);
+        let now = cost(placement, &real);
+        placement.correct(vertices, curvature, &real);
+        let mut moved = match objective {
+            ConeObjective::LogScale => match placement.settle(choice) {
+                Some(choice) => Found {
+                    vertices: choice.vertices(),
+                    curvature: choice.best.curvature,
+                    cost: now,
+                },
+                None => return found,
+            },
+            ConeObjective::AreaDistortion => {
+                moves::settle(placement, self.mesh, vertices, curvature, rule).found()
+            }
+        };
+        let next = placement.real_log_scale(&moved.vertices, &moved.curvature);
+        moved.cost = cost(placement, &next);
+        if moved.cost < now { moved } else { found }
     }
 }
 

@@ -11,6 +11,7 @@
 //!   of curvature c at x feels the force −c ∇p(x), so it is tried at the vertex of a ring around x where c p is least; the ring shrinks
 //!   when that does not help. This moves cones as Li et al. 2023 do, with sets of candidates in place of a line search.
 
+use super::Found;
 use super::area::Points;
 use super::placement::Placement;
 use super::quadratic::Limits;
@@ -65,6 +66,14 @@ pub(super) struct Arrangement {
 }
 
 impl Arrangement {
+    pub(super) fn found(self) -> Found {
+        Found {
+            vertices: self.vertices(),
+            curvature: self.curvature,
+            cost: self.value,
+        }
+    }
+
     pub(super) fn vertices(&self) -> Vec<usize> {
         self.places.iter().map(|p| p.vertex).collect()
     }

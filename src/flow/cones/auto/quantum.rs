@@ -7,13 +7,19 @@
 //! place, with or without giving a quantum to another cone, cones of nothing disappear and new ones of one quantum appear.
 //! Every step lowers the energy, so it ends.
 
+use super::Found;
 use super::area::Points;
-use super::moves::Arrangement;
+use super::moves::{self, Arrangement, Rule};
 use super::placement::{Choice, Placement, Site};
 use super::quadratic::Limits;
+use crate::geometry::mesh::Mesh;
 
 /// Share of the energy that a step must gain.
 const LEAST_GAIN: f64 = 1e-3;
+/// Rounds of moving cones and quanta for (9).
+const ROUNDS: usize = 4;
+/// Greatest numbers of quanta at a cone that are tried at most, the least first.
+const CAPS: usize = 4;
 /// Passes over all cones.
 const PASSES: usize = 8;
 
@@ -51,6 +57,21 @@ impl Quanta {
             ],
             total,
         })
+    }
+
+    /// Limits with each greatest number of quanta at a cone that lets `count` cones meet the total.
+    pub(super) fn caps(self, count: usize) -> Vec<Limits> {
+        let [low, high] = self.range;
+        let enough = |cap: i64| self.total.is_none_or(|total| cap * count as i64 >= total);
+        let total = self.total.map(|k| k as f64 * self.size);
+        (1..=high.max(1))
+            .filter(|&cap| cap <= high && enough(cap))
+            .take(CAPS)
+            .map(|cap| Limits {
+                range: [low as f64 * self.size, cap as f64 * self.size],
+                total,
+            })
+            .collect()
     }
 
     fn allows(self, k: i64) -> bool {
@@ -133,7 +154,7 @@ pub(super) fn quantise(
     choice: &Choice,
     quanta: Quanta,
     count: usize,
-) -> Option<(Vec<usize>, Vec<f64>)> {
+) -> Option<Found> {
     let mut sites = choice.sites.clone();
     let of = |placement: &Placement, sites: &[Site], k: &[i64]| {
         placement.energy(sites, &quanta.radians(k))
@@ -184,7 +205,12 @@ pub(super) fn quantise(
         .zip(quanta.radians(&k))
         .collect();
     cones.retain(|(_, c)| *c != 0.0);
-    Some(cones.into_iter().unzip())
+    let (vertices, curvature) = cones.into_iter().unzip();
+    Some(Found {
+        vertices,
+        curvature,
+        cost: energy,
+    })
 }
 
 /// Where cone `i` would best be, with what numbers of quanta, and the energy then. `i` may be one past the last.
@@ -223,8 +249,36 @@ fn best_place(
         .reduce(|a, b| if b.2 < a.2 { b } else { a })
 }
 
+/// Moves cones, and quanta between them, as long as that lowers (9).
+pub(super) fn lower_distortion(
+    placement: &mut Placement,
+    mesh: &Mesh,
+    mut found: Found,
+    quanta: Quanta,
+) -> Found {
+    found.cost = f64::INFINITY;
+    for _ in 0..ROUNDS {
+        let (vertices, curvature) = (&found.vertices, &found.curvature);
+        let now = moves::lower_distortion(placement, mesh, vertices, curvature, Rule::Fixed);
+        if now.value >= found.cost * (1.0 - LEAST_GAIN) {
+            break;
+        }
+        let curvature = transfer(placement.points(), &now, quanta);
+        found = now.found();
+        if curvature == found.curvature {
+            break;
+        }
+        found.curvature = curvature;
+        let kept: Vec<bool> = found.curvature.iter().map(|c| *c != 0.0).collect();
+        let mut keep = kept.iter();
+        (found.vertices).retain(|_| keep.next().copied().unwrap_or(true));
+        found.curvature.retain(|c| *c != 0.0);
+    }
+    found
+}
+
 /// Moves quanta between cones that stay where they are, as long as that lowers (9).
-pub(super) fn transfer(points: Points, now: &Arrangement, quanta: Quanta) -> Vec<f64> {
+fn transfer(points: Points, now: &Arrangement, quanta: Quanta) -> Vec<f64> {
     let answers = now.answers();
     let mut k: Vec<i64> = now
         .curvature
