@@ -59,7 +59,7 @@ pub fn mirror(objective: ConeObjective) -> Result<(), String> {
         found.map(|v| v as u32).ok_or("no mirror image")
     };
     let mut failed = Vec::new();
-    for count in [3, 4, 5, 6, 8, 10, 12, 16] {
+    for count in [4, 5, 6, 8, 10, 12, 16] {
         let params = ConeParams {
             count: Some(count),
             objective,

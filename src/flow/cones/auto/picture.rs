@@ -77,9 +77,13 @@ impl Picture {
         let mut system = System::new(&unknowns, None)?;
         let mut laplacian = system.assemble(connectivity, &weight);
         let area = vertex_areas(mesh);
-        if let (false, Some(last)) = (is_free, laplacian.diagonal.last_mut()) {
-            // Where the right side adds up to 0, u = 0 at the last vertex.
-            *last *= 2.0;
+        if !is_free {
+            // Where the right side adds up to 0, u = 0 at this vertex; one that does not depend on numbers.
+            let largest = (0..area.len()).max_by(|&v, &w| area[v].total_cmp(&area[w]));
+            let ground = largest.map_or(NONE, |v| system.unknown.as_slice()[v]);
+            if let Some(diagonal) = laplacian.diagonal.get_mut(ground as usize) {
+                *diagonal *= 2.0;
+            }
         }
         let square = squares(&mut system, &laplacian, &area, copies)?;
         system.factorize(&laplacian)?;

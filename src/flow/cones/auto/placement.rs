@@ -599,10 +599,10 @@ fn sample(
     count: usize,
 ) -> Vec<usize> {
     let mut vertices: Vec<usize> = (0..order.len()).filter(|&v| allowed[v]).collect();
+    vertices.sort_by(|&v, &w| order[v].total_cmp(&order[w]).then(v.cmp(&w)));
     if vertices.len() <= 2 * count {
         return vertices;
     }
-    vertices.sort_by(|&v, &w| order[v].total_cmp(&order[w]).then(v.cmp(&w)));
     let radius = ((vertices.len() / count) as f64).sqrt().round().max(1.0) as usize;
     let mut is_near = vec![false; order.len()];
     let mut samples = Vec::new();
