@@ -5,7 +5,7 @@
 //! | step | follows | ours |
 //! | --- | --- | --- |
 //! | log scale as a linear function of curvature, one factorisation ([`picture`]) | Ben-Chen, Gotsman, Bunin 2008 | variance of every answer at once, from the diagonal of an inverse |
-//! | few cones with little variance of the log scale ([`placement`]) | the aim of Soliman, Slepčev, Crane 2018 and Fang et al. 2021 | exact gain of every vertex without a solve; exchange |
+//! | few cones with little variance of the log scale ([`placement`], [`search`], [`pairs`]) | the aim of Soliman, Slepčev, Crane 2018 and Fang et al. 2021 | exact gain of every vertex without a solve; exchange |
 //! | multiples of a quantum ([`quantum`]) | the aim of Li et al. 2022 | local search on a quadratic function of integers |
 //! | what the mesh really does ([`Placement::correct`]) | | Newton steps with the same factor |
 //! | cones moved until (9) is least ([`moves`], [`area`]) | moving cones: Li et al. 2023 | far moves on cells |
@@ -18,12 +18,14 @@
 //! out.
 
 mod area;
+mod climb;
 mod moves;
 mod pairs;
 mod picture;
 mod placement;
 mod quadratic;
 mod quantum;
+mod search;
 
 use super::{
     BoundaryCondition, BoundaryParams, ConeError, ConeObjective, ConeParams, DEFAULT_COUNT,

@@ -1,0 +1,110 @@
+//! The vertex of a surface where something is worth most.
+//!
+//! *Enters:* a worth of every vertex. *Leaves:* a vertex worth more than its neighbours, found uphill from the best of some samples. The worth
+//! of a place for a cone is a smooth function but for the cones that are there, so few samples are enough.
+
+use super::placement::Placement;
+use crate::geometry::connectivity::Connectivity;
+use crate::geometry::ids::VertexId;
+use rayon::prelude::*;
+
+/// Samples to climb from.
+const SUMMITS: usize = 6;
+/// Samples a thread looks at in one go.
+const PIECE: usize = 256;
+
+impl Placement<'_> {
+    /// The vertex worth most: uphill from one vertex, or from the best of the samples. `worth` gets a buffer of its own.
+    pub(super) fn climb(
+        &self,
+        from: Option<usize>,
+        taken: impl Fn(usize) -> bool + Sync,
+        worth: impl Fn(usize, &mut Vec<f64>) -> f64 + Sync,
+    ) -> Option<(usize, f64)> {
+        let starts = match &from {
+            Some(vertex) => std::slice::from_ref(vertex),
+            None => &self.samples,
+        };
+        let scored: Vec<(usize, f64)> = starts
+            .par_iter()
+            .with_min_len(PIECE)
+            .filter(|&&v| !taken(v))
+            .map_init(Vec::new, |row, &v| (v, worth(v, row)))
+            .collect();
+        let mut row = Vec::new();
+        let mut best: Option<(usize, f64)> = None;
+        for mut top in summits(&scored) {
+            loop {
+                let around = self.connectivity.neighbours(VertexId::new(top.0));
+                let next = around
+                    .map(VertexId::index)
+                    .filter(|&w| !taken(w))
+                    .map(|w| (w, worth(w, &mut row)))
+                    .fold(top, |a, b| if b.1 > a.1 { b } else { a });
+                if next.0 == top.0 {
+                    break;
+                }
+                top = next;
+            }
+            if best.is_none_or(|b| top.1 > b.1) {
+                best = Some(top);
+            }
+        }
+        best
+    }
+}
+
+/// The few that are worth most.
+fn summits(scored: &[(usize, f64)]) -> Vec<(usize, f64)> {
+    let mut best: Vec<(usize, f64)> = Vec::with_capacity(SUMMITS + 1);
+    for &one in scored {
+        let place = best.partition_point(|b| b.1 >= one.1);
+        if place < SUMMITS {
+            best.insert(place, one);
+            best.truncate(SUMMITS);
+        }
+    }
+    best
+}
+
+/// Vertices spread over the surface, about `count` of them: those of the lowest `order` first, none within some edges of another.
+pub(super) fn sample(
+    connectivity: &Connectivity,
+    allowed: &[bool],
+    order: &[f64],
+    count: usize,
+) -> Vec<usize> {
+    let mut vertices: Vec<usize> = (0..order.len()).filter(|&v| allowed[v]).collect();
+    vertices.sort_by(|&v, &w| order[v].total_cmp(&order[w]).then(v.cmp(&w)));
+    if vertices.len() <= 2 * count {
+        return vertices;
+    }
+    let radius = ((vertices.len() / count) as f64).sqrt().round().max(1.0) as usize;
+    let mut is_near = vec![false; order.len()];
+    let mut samples = Vec::new();
+    for v in vertices {
+        if is_near[v] {
+            continue;
+        }
+        samples.push(v);
+        is_near[v] = true;
+        let (mut ring, mut within) = (vec![v], vec![v]);
+        for _ in 0..radius {
+            let mut next = Vec::new();
+            for &x in &ring {
+                for w in connectivity
+                    .neighbours(VertexId::new(x))
+                    .map(VertexId::index)
+                {
+                    if !within.contains(&w) {
+                        within.push(w);
+                        next.push(w);
+                        is_near[w] = true;
+                    }
+                }
+            }
+            ring = next;
+        }
+    }
+    samples
+}
