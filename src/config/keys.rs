@@ -271,7 +271,7 @@ pub const KEYS: &[Key] = &[
             below: 2.0,
         },
         "multiples of π",
-        "\"5/4\"",
+        "\"9/8\"",
     ),
     key(
         "cones.boundary_distance",

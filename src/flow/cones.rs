@@ -191,7 +191,7 @@ impl Default for ConeParams {
             quantum: PiMultiple::literal(0, 1),
             objective: ConeObjective::default(),
             min_curvature: PiMultiple::literal(-4, 1),
-            max_curvature: PiMultiple::literal(5, 4),
+            max_curvature: PiMultiple::literal(9, 8),
             boundary_distance: 0.0,
             file: None,
             file_lines: Vec::new(),

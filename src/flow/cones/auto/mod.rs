@@ -41,8 +41,8 @@ use quadratic::Limits;
 use quantum::Quanta;
 use std::f64::consts::TAU;
 
-/// Variances of the log scale up to this factor of the least count as hardly more.
-const NEAR_COST: f64 = 1.4;
+/// Share of the least variance of the log scale that counts as hardly more.
+const NEAR_COST: f64 = 0.4;
 /// Curvatures in excess of a limit that are rounding, radians.
 const ROUNDING: f64 = 1e-9;
 
@@ -171,7 +171,9 @@ struct Found {
 /// the other: a cone of 3/2 π instead of three of π/2 makes (9) many times as large.
 fn cheapest(found: Vec<Found>) -> Option<Found> {
     let least = found.iter().map(|f| f.cost).fold(f64::INFINITY, f64::min);
-    let near = found.into_iter().filter(|f| f.cost <= least * NEAR_COST);
+    // A variance of nothing may be negative by rounding.
+    let hardly_more = least + NEAR_COST * least.abs();
+    let near = found.into_iter().filter(|f| f.cost <= hardly_more);
     near.reduce(|a, b| if b.distortion < a.distortion { b } else { a })
 }
 
