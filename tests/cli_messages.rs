@@ -615,7 +615,7 @@ fn cone_files_that_do_not_fit_the_mesh_or_the_keys() {
       :                 ^
       `----
      help: `cones.max_curvature`: a number or a fraction such as "1/2", from 0 to below 2, in
-           multiples of π; default "3/2"
+           multiples of π; default "5/4"
     "#);
     let folder = folder();
     insta::assert_snapshot!(refusal(folder.path(), &["build", "a.obj", "--set", "cones.file=b.txt"], 2), @r"
@@ -641,6 +641,7 @@ fn rounding_of_a_cone_file_is_shared_out_with_a_note() {
       connectivity repair: off
       Gauss–Bonnet: 4π required, 4π prescribed
       4 cones of 1π: at vertices 0, 1, 2 and 3 of the file
+      flat metric: exists; with flips Gauss–Bonnet and positive cone angles are all it takes, and both hold
     ");
 }
 

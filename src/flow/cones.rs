@@ -4,16 +4,17 @@
 //! Gauss–Bonnet (5), or an error with both totals.
 //!
 //! An asset may have several components, and Gauss–Bonnet holds for each: [`assign`] finds the component of every
-//! vertex and point that the user names, [`prescribe`] then works on one component. Without any wish:
+//! vertex and point that the user names, [`prescribe`] then works on one component. Without any wish the program chooses places and
+//! curvatures by itself (the private module `auto`), so that the log scale deviates least from its mean:
 //!
 //! | component | cones |
 //! | --- | --- |
-//! | closed, genus 0 | 8 of π/2, spread (4 of π where there are fewer than 8 vertices) |
-//! | closed, genus 1 | none |
-//! | closed, genus g > 1 | 2g − 2 of −2π, spread |
-//! | with boundary | none; the boundary is free |
+//! | closed, of any genus | at most 8 that add up to 2πχ; as many as that needs |
+//! | with boundary | at most 8, none where the surface is flat; the boundary is free |
+//! | with a boundary that is prescribed | no more than Gauss–Bonnet needs: none on a disk |
 //!
-//! A component to which a list names no cone is treated as if there were no list.
+//! Cones that would lower the deviation by less than a hundredth are left out. A component to which a list names no cone is treated as
+//! if there were no list.
 //!
 //! *Guaranteed:* cone angles are positive, ΣK̄ = 2πχ (to rounding) unless the boundary is free, and then Σ over the interior
 //! exceeds 2πχ − π·(boundary vertices). *Not guaranteed:* that a circle packing with this curvature exists
@@ -102,7 +103,7 @@ impl Prescription {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ConeStrategy {
-    /// The list where there is one, else by genus and boundary; see the module docs.
+    /// The list where there is one, else places and curvatures that make [`ConeObjective`] least; see the module docs.
     #[default]
     Auto,
     /// Those of the list.
@@ -281,7 +282,7 @@ pub fn prescribe(
     let mut named = VertexVec::filled(None, mesh.connectivity.vertex_count());
     let on_boundary = boundary::prescribed_total(&topology, requests, condition, boundary)?;
     let chosen = match (cones.strategy, requests.cones.is_empty()) {
-        (ConeStrategy::Auto, true) => {
+        (ConeStrategy::Auto | ConeStrategy::Listed, true) => {
             auto::select(mesh, &topology, requests, condition, cones, boundary)?
         }
         _ => choose(mesh, &topology, requests, cones, on_boundary)?,
@@ -330,7 +331,7 @@ pub fn prescribe(
     Ok(Prescription::new(target, condition))
 }
 
-/// The cones that the user names or the strategy yields.
+/// The cones that the user names or that a strategy other than the automatic choice yields.
 fn choose(
     mesh: &Mesh,
     topology: &Topology,
@@ -340,20 +341,9 @@ fn choose(
 ) -> Result<Vec<RequestedCone>, ConeError> {
     let total = TAU * topology.euler_characteristic as f64 - on_boundary;
     match params.strategy {
-        ConeStrategy::Auto | ConeStrategy::Listed if !requests.cones.is_empty() => {
-            Ok(requests.cones.clone())
-        }
+        // Where there are none, they are chosen automatically.
+        ConeStrategy::Auto | ConeStrategy::Listed => Ok(requests.cones.clone()),
         ConeStrategy::None => Ok(Vec::new()),
-        ConeStrategy::Auto | ConeStrategy::Listed => {
-            let vertices = mesh.connectivity.vertex_count();
-            let (count, curvature) = match topology.euler_characteristic {
-                _ if topology.boundary_loops > 0 => (0, 0.0),
-                2.. if vertices < 8 => (4, PI),
-                2.. => (8, PI / 2.0),
-                chi => (usize::try_from(-chi).unwrap_or(0), -TAU),
-            };
-            spread_cones(mesh, count, curvature)
-        }
         ConeStrategy::Spread => {
             let count = params.count.unwrap_or(DEFAULT_COUNT);
             if count == 0 {

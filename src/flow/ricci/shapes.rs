@@ -67,7 +67,7 @@ impl Shape {
         }
     }
 
-    /// What a configuration that says nothing prescribes: 8 cones of π/2 on spheres, none on tori, 2g − 2 of −2π above,
+    /// Equal cones: 8 of π/2 on spheres, none on tori, 2g − 2 of −2π above,
     /// spread by edge-graph distance; free boundaries.
     pub(crate) fn prescribe_default(&self) -> Prescription {
         let topology = self.connectivity.topology();
