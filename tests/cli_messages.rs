@@ -615,7 +615,7 @@ fn cone_files_that_do_not_fit_the_mesh_or_the_keys() {
       :                 ^
       `----
      help: `cones.max_curvature`: a number or a fraction such as "1/2", from 0 to below 2, in
-           multiples of π; default "5/4"
+           multiples of π; default "9/8"
     "#);
     let folder = folder();
     insta::assert_snapshot!(refusal(folder.path(), &["build", "a.obj", "--set", "cones.file=b.txt"], 2), @r"

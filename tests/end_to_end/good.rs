@@ -20,7 +20,7 @@ pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     files
 }
 
-/// At most 8 cones of −4π to 5/4 π each; on a closed surface they add up to 2πχ.
+/// At most 8 cones of −4π to 9/8 π each; on a closed surface they add up to 2πχ.
 fn assert_default_cones(document: &serde_json::Value, genus: u32, loops: u32) {
     let cones = document["cones"].as_array().expect("a list").iter();
     let curvature = |cone: &serde_json::Value| cone["curvature"].as_f64().expect("radians") / PI;

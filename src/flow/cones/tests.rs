@@ -166,7 +166,7 @@ fn assert_within_limits(prescription: &Prescription) {
 fn defaults_are_at_most_eight_cones_within_their_limits() {
     let (auto, none) = (ConeParams::default(), BoundaryParams::default());
     let on_sphere = one(&sphere(8), &auto, &none).unwrap();
-    // 4π in parts of at most 5/4 π.
+    // 4π in parts of at most 9/8 π.
     assert!(on_sphere.cones.len() >= 4);
     assert_within_limits(&on_sphere);
     assert_within_limits(&one(&torus(6, &[]), &auto, &none).unwrap());
@@ -538,7 +538,7 @@ fn a_uniform_boundary_shares_what_the_cones_leave() {
     let filled = one(&two, &auto, &much).unwrap();
     let inside: Vec<f64> = filled.cones.iter().map(|c| c.curvature / PI).collect();
     let inside: Vec<f64> = inside.into_iter().filter(|&k| k > 0.0).collect();
-    assert_eq!(inside.len(), 2, "2π in parts of at most 5/4 π: {inside:?}");
+    assert_eq!(inside.len(), 2, "2π in parts of at most 9/8 π: {inside:?}");
 }
 
 fn on_boundary(vertex: u32, n: i64, d: i64) -> BoundarySpec {
