@@ -163,7 +163,7 @@ impl Network {
         let mut surplus = vec![0i128; inner];
         let mut most = 0i128;
         // Each gets all that it lacks, or gives all that it could, and so has too much or too little.
-        for x in 0..inner {
+        for (x, surplus) in surplus.iter_mut().enumerate() {
             let end = self.range(x).find_map(|arc| {
                 let Arc { head, back, .. } = self.arcs[arc];
                 match head as usize {
@@ -176,7 +176,7 @@ impl Network {
                 let room = self.arcs[arc].room;
                 if room <= small {
                     self.push(arc, room);
-                    surplus[x] = if fed { room } else { -room };
+                    *surplus = if fed { room } else { -room };
                     most += room;
                 }
             }

@@ -185,7 +185,7 @@ impl Picture {
                 })
                 .collect();
             let error = missing.iter().map(|k| k * k).sum::<f64>();
-            if !(error < least) {
+            if error.is_nan() || error >= least {
                 break;
             }
             least = error;
