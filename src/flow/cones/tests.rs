@@ -183,7 +183,10 @@ fn where_every_vertex_may_be_a_cone_the_metric_stays() {
         vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
         vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
     );
-    let params = ConeParams::default();
+    let params = ConeParams {
+        max_curvature: PiMultiple::fraction(3, 2).unwrap(),
+        ..ConeParams::default()
+    };
     let result = one(&tetrahedron, &params, &BoundaryParams::default()).unwrap();
     // Angle defects: three right angles at the first vertex; two of π/4 and one of π/3 at each of the others.
     let defects = [0.5, 7.0 / 6.0, 7.0 / 6.0, 7.0 / 6.0];
