@@ -124,12 +124,16 @@ pub fn stationary(file: &Path, objective: ConeObjective) -> Result<(), String> {
         let (less, more) = (cost(-STEP, i)?, cost(STEP, i)?);
         let slope = (more - less) / (2.0 * STEP);
         let bend = (more - 2.0 * here + less) / (STEP * STEP);
-        let (far, gain) = (-slope / bend, 0.5 * slope * slope / bend / here);
+        // Where the parabola has no least value, the two measured ones count.
+        let (far, gain) = match bend > 0.0 {
+            true => (-slope / bend, 0.5 * slope * slope / bend / here),
+            false => (f64::INFINITY, (here - less.min(more)) / here),
+        };
         println!(
             "{objective:?}, cones {i} and next: best {far:+.4} away, gains {:.3} %",
             100.0 * gain
         );
-        if !(bend > 0.0 && (far.abs() <= FROM_BEST || gain <= TO_GAIN)) {
+        if far.abs() > FROM_BEST && gain > TO_GAIN {
             failed.push(format!(
                 "{i}: slope {slope:.4}, bend {bend:.4}, best {far:+.3} away, gains {gain:.4}"
             ));

@@ -7,6 +7,7 @@
 mod common;
 mod defaults;
 mod dense;
+mod limits;
 mod linear;
 mod models;
 mod optimality;
@@ -104,6 +105,12 @@ fn main() {
             case,
         ));
     }
+    let case = |corpus: &Path| limits::log_scale_bound(&corpus.join("spot.obj"));
+    trials.push(trial("limits/log-scale".into(), corpus.clone(), case));
+    let case = |corpus: &Path| limits::boundary_distance(&corpus.join("face.obj"));
+    trials.push(trial("limits/boundary".into(), corpus.clone(), case));
+    let case = |corpus: &Path| limits::curvatures(&corpus.join("spot.obj"));
+    trials.push(trial("limits/curvatures".into(), corpus.clone(), case));
     for model in MODELS {
         let case = move |corpus: &Path| defaults::beside_spread(&corpus.join(model));
         trials.push(trial(format!("default/{model}"), corpus.clone(), case));

@@ -773,3 +773,39 @@ fn real_models_get_their_defaults() {
         assert_within_limits(&result);
     }
 }
+
+#[test]
+fn impossible_automatic_choices_are_refused_with_both_numbers() {
+    let pi = |n, d| PiMultiple::fraction(n, d).unwrap();
+    let quarter = ConeParams {
+        count: Some(6),
+        max_curvature: pi(1, 2),
+        ..ConeParams::default()
+    };
+    let cases = [
+        (
+            quarter.clone(),
+            "cones.count = 6, but cones must add up to 4π here, and within cones.min_curvature and cones.max_curvature that takes 8",
+        ),
+        (
+            ConeParams {
+                quantum: pi(3, 5),
+                ..ConeParams::default()
+            },
+            "which is no multiple of cones.quantum = 0.6π",
+        ),
+        (
+            ConeParams {
+                count: Some(8),
+                quantum: pi(2, 3),
+                max_curvature: pi(3, 5),
+                ..quarter
+            },
+            "are multiples of cones.quantum = 2/3π and add up to 4π",
+        ),
+    ];
+    for (params, expected) in cases {
+        let error = one(&sphere(8), &params, &BoundaryParams::default()).unwrap_err();
+        assert!(error.to_string().contains(expected), "{error}");
+    }
+}

@@ -235,9 +235,20 @@ impl Search<'_> {
             ConeObjective::LogScale => placement.picture.variance(u),
             ConeObjective::AreaDistortion => placement.at(u).value(&[], &[]),
         };
+        let mut found = found;
+        let mut real = placement.real_log_scale(&found.vertices, &found.curvature);
+        let mut now = cost(placement, &real);
+        if objective == ConeObjective::AreaDistortion {
+            // Strong cones may make the linear picture promise too much: then what it started from is better.
+            let (vertices, curvature) = (choice.vertices(), &choice.best.curvature);
+            let first = placement.real_log_scale(&vertices, curvature);
+            if cost(placement, &first) < now {
+                now = cost(placement, &first);
+                real = first;
+                (found.vertices, found.curvature) = (vertices, curvature.clone());
+            }
+        }
         let (vertices, curvature) = (&found.vertices, &found.curvature);
-        let real = placement.real_log_scale(vertices, curvature);
-        let now = cost(placement, &real);
         placement.correct(vertices, curvature, &real);
         let mut moved = match objective {
             ConeObjective::LogScale => match placement.settle(choice) {

@@ -34,6 +34,8 @@ const FAR_PASSES: usize = 2;
 const TRIALS: usize = 3;
 /// Newton steps for the curvatures at most.
 const STEPS: usize = 12;
+/// The same for a near move, after which curvatures change little.
+const NEAR_STEPS: usize = 1;
 /// First radius of the rings, in square roots of the area.
 const FIRST_RADIUS: f64 = 0.15;
 /// The same where cones are all but placed.
@@ -108,7 +110,7 @@ pub(super) fn lower_distortion(
     rule: Rule,
 ) -> Arrangement {
     let places = placement.places(vertices);
-    let mut now = arrange(placement, places, curvature, rule);
+    let mut now = arrange(placement, places, curvature, rule, STEPS);
     if vertices.is_empty() {
         return now;
     }
@@ -141,7 +143,7 @@ pub(super) fn lower_distortion(
             }
         }
         let start: Vec<f64> = moved.iter().map(|(_, c)| *c).collect();
-        let next = arrange(placement, places, &start, rule);
+        let next = arrange(placement, places, &start, rule, STEPS);
         let next = near(placement, mesh, next, rule, FIRST_RADIUS);
         if next.value > now.value * (1.0 - FAR_GAIN) {
             if next.value < now.value {
@@ -163,7 +165,7 @@ pub(super) fn settle(
     rule: Rule,
 ) -> Arrangement {
     let places = placement.places(vertices);
-    let now = arrange(placement, places, curvature, rule);
+    let now = arrange(placement, places, curvature, rule, STEPS);
     near(placement, mesh, now, rule, LAST_RADIUS)
 }
 
@@ -172,9 +174,10 @@ fn arrange(
     places: Vec<Place>,
     curvature: &[f64],
     rule: Rule,
+    steps: usize,
 ) -> Arrangement {
     let answers: Vec<&[f64]> = places.iter().map(|p| p.answer.as_slice()).collect();
-    let (curvature, value) = rule.apply(placement.points(), &answers, curvature, STEPS);
+    let (curvature, value) = rule.apply(placement.points(), &answers, curvature, steps);
     Arrangement {
         places,
         curvature,
@@ -306,7 +309,8 @@ fn near(
             }
         }
         if radius.iter().all(|r| *r < 0.0) {
-            return now;
+            let places = now.places;
+            return arrange(placement, places, &now.curvature, rule, STEPS);
         }
         if candidates.is_empty() {
             continue;
@@ -315,7 +319,7 @@ fn near(
         for ((i, _), place) in candidates.into_iter().zip(placement.places(&vertices)) {
             let mut places = now.places.clone();
             places[i] = place;
-            let next = arrange(placement, places, &now.curvature, rule);
+            let next = arrange(placement, places, &now.curvature, rule, NEAR_STEPS);
             if next.value < now.value * (1.0 - NEAR_GAIN) {
                 now = next;
             } else {
