@@ -82,13 +82,6 @@ fn main() {
             let name = format!("peers/{name}/{objective:?}");
             trials.push(trial(name, corpus.clone(), case));
         }
-        for (model, condition) in STABLE {
-            let case = move |corpus: &Path| {
-                stability::subdivision(&corpus.join(model), condition, objective)
-            };
-            let name = format!("subdivision/{objective:?}/{model}, {}", condition.name());
-            trials.push(trial(name, corpus.clone(), case));
-        }
         for model in VARIED {
             let case = move |corpus: &Path| stability::invariance(&corpus.join(model), objective);
             let name = format!("invariance/{objective:?}/{model}");
@@ -104,6 +97,14 @@ fn main() {
             corpus.clone(),
             case,
         ));
+    }
+    // (9) has many local optima that are worth nearly the same; which is found depends on the mesh.
+    let objective = ConeObjective::LogScale;
+    for (model, condition) in STABLE {
+        let case =
+            move |corpus: &Path| stability::subdivision(&corpus.join(model), condition, objective);
+        let name = format!("subdivision/{objective:?}/{model}, {}", condition.name());
+        trials.push(trial(name, corpus.clone(), case));
     }
     let case = |corpus: &Path| limits::log_scale_bound(&corpus.join("spot.obj"));
     trials.push(trial("limits/log-scale".into(), corpus.clone(), case));
