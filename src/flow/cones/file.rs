@@ -4,7 +4,7 @@
 //! the first vertex (0 as in CEPS, 1 as in MovingCones). *Leaves:* the cones in the order of their lines, every
 //! curvature to the last bit, or a [`ConeFileError`] with the place. Blank lines and what follows a `#` are skipped.
 //!
-//! *Guaranteed:* no vertex twice, all numbers finite; [`write`] and [`parse`] are inverse to each other.
+//! *Guaranteed:* no vertex twice, all numbers finite; [`write()`] and [`parse`] are inverse to each other.
 //! *Not guaranteed:* that the mesh has such vertices, nor Gauss–Bonnet: both are checked where the mesh is known.
 
 use super::{ConeSpec, PiMultiple};
