@@ -269,7 +269,7 @@ fn dot(a: &VertexVec<f64>, b: &VertexVec<f64>) -> f64 {
     a.iter().zip(b.iter()).map(|(a, b)| a * b).sum()
 }
 
-fn moved(u: &VertexVec<f64>, direction: &VertexVec<f64>, step: f64) -> VertexVec<f64> {
+pub(crate) fn moved(u: &VertexVec<f64>, direction: &VertexVec<f64>, step: f64) -> VertexVec<f64> {
     u.iter()
         .zip(direction.iter())
         .map(|(u, d)| u + step * d)

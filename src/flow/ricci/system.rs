@@ -119,7 +119,7 @@ impl System {
 
     /// Solves H δ = −residual with `shift` (relative to the largest row) on the diagonal; δ is 0 at vertices that are no
     /// unknowns. `None` where the matrix is not positive definite.
-    pub(super) fn direction(
+    pub(crate) fn direction(
         &mut self,
         hessian: &Hessian,
         shift: f64,

@@ -14,13 +14,14 @@ const SUMMITS: usize = 6;
 const PIECE: usize = 256;
 
 impl Placement<'_> {
-    /// The vertex worth most: uphill from one vertex, or from the best of the samples. `worth` gets a buffer of its own.
+    /// Vertices worth more than their neighbours, the best first: uphill from one vertex, or from the best of the samples. `worth` gets a buffer of
+    /// its own.
     pub(super) fn climb(
         &self,
         from: Option<usize>,
         taken: impl Fn(usize) -> bool + Sync,
         worth: impl Fn(usize, &mut Vec<f64>) -> f64 + Sync,
-    ) -> Option<(usize, f64)> {
+    ) -> Vec<(usize, f64)> {
         let starts = match &from {
             Some(vertex) => std::slice::from_ref(vertex),
             None => &self.samples,
@@ -32,7 +33,7 @@ impl Placement<'_> {
             .map_init(Vec::new, |row, &v| (v, worth(v, row)))
             .collect();
         let mut row = Vec::new();
-        let mut best: Option<(usize, f64)> = None;
+        let mut tops: Vec<(usize, f64)> = Vec::new();
         for mut top in summits(&scored) {
             loop {
                 let around = self.connectivity.neighbours(VertexId::new(top.0));
@@ -46,11 +47,13 @@ impl Placement<'_> {
                 }
                 top = next;
             }
-            if best.is_none_or(|b| top.1 > b.1) {
-                best = Some(top);
+            if tops.iter().all(|t| t.0 != top.0) {
+                tops.push(top);
             }
         }
-        best
+        // Stable: of equals the first found.
+        tops.sort_by(|a, b| b.1.total_cmp(&a.1));
+        tops
     }
 }
 

@@ -5,10 +5,10 @@
 //! | step | follows | ours |
 //! | --- | --- | --- |
 //! | log scale as a linear function of curvature, one factorisation ([`picture`]) | Ben-Chen, Gotsman, Bunin 2008 | variance of every answer at once, from the diagonal of an inverse |
-//! | few cones with little variance of the log scale ([`placement`], [`search`], [`pairs`]) | the aim of Soliman, Slepčev, Crane 2018 and Fang et al. 2021 | exact gain of every vertex without a solve; exchange |
+//! | few cones with little variance of the log scale ([`placement`], [`search`]) | the aim of Soliman, Slepčev, Crane 2018 and Fang et al. 2021 | exact gain of every vertex without a solve; exchange |
 //! | multiples of a quantum ([`quantum`]) | the aim of Li et al. 2022 | local search on a quadratic function of integers |
-//! | what the mesh really does ([`Placement::correct`]) | | Newton steps with the same factor |
-//! | cones moved until (9) is least ([`moves`], [`area`]) | moving cones: Li et al. 2023 | far moves on cells |
+//! | what the mesh really does ([`Placement::correct`]) | | some Newton steps of the flow |
+//! | cones moved until (9) is least ([`area`], [`near`], [`far`], [`moves`]) | moving cones: Li et al. 2023 | the force on every vertex at once; far moves on cells |
 //!
 //! The two objectives differ. The standard deviation of the log scale counts shrinking and growing alike. (9) is ruled by what grows: an ear
 //! that shrinks to nothing costs it no more than the ear's area, so with few cones its optimum may be a surface that lost its ears.
@@ -18,9 +18,11 @@
 //! out.
 
 mod area;
+mod arrangement;
 mod climb;
+mod far;
 mod moves;
-mod pairs;
+mod near;
 mod picture;
 mod placement;
 mod quadratic;
@@ -34,15 +36,15 @@ use super::{
 use crate::geometry::connectivity::Topology;
 use crate::geometry::ids::{VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
-use moves::Rule;
+use arrangement::Rule;
 use picture::Picture;
 use placement::{Choice, Placement};
 use quadratic::Limits;
 use quantum::Quanta;
 use std::f64::consts::TAU;
 
-/// Share of the least variance of the log scale that counts as hardly more.
-const NEAR_COST: f64 = 0.4;
+/// Share of the least variance of the log scale that counts as hardly more: a quarter of the standard deviation.
+const NEAR_COST: f64 = 0.6;
 /// Curvatures in excess of a limit that are rounding, radians.
 const ROUNDING: f64 = 1e-9;
 
@@ -202,8 +204,8 @@ impl Search<'_> {
         let rule = Rule::Best(placement.limits);
         if objective == ConeObjective::AreaDistortion {
             let (vertices, curvature) = (&found.vertices, &found.curvature);
-            found =
-                moves::lower_distortion(placement, self.mesh, vertices, curvature, rule).found();
+            let moved = placement.lower_distortion(self.mesh, vertices, curvature, rule);
+            found = moved.found();
         }
         Ok(vec![self.settle(placement, choice, found, rule)])
     }
@@ -212,7 +214,7 @@ impl Search<'_> {
     fn in_quanta(&self, placement: &mut Placement, choice: &Choice, quanta: Quanta) -> Vec<Found> {
         let count = choice.sites.len();
         let mut found = Vec::new();
-        for fewer in [0, 1, count / 4, count / 2] {
+        for fewer in 0..=count.div_ceil(2) {
             let start = placement.prune(choice.clone(), count - fewer.min(count));
             let whole = start.and_then(|s| quantum::quantise(placement, &s, quanta, self.most));
             let Some(mut whole) = whole else { continue };
@@ -260,9 +262,9 @@ impl Search<'_> {
                 },
                 None => return found,
             },
-            ConeObjective::AreaDistortion => {
-                moves::settle(placement, self.mesh, vertices, curvature, rule).found()
-            }
+            ConeObjective::AreaDistortion => placement
+                .settle_distortion(self.mesh, vertices, curvature, rule)
+                .found(),
         };
         let next = placement.real_log_scale(&moved.vertices, &moved.curvature);
         moved.cost = cost(placement, &next);

@@ -10,10 +10,12 @@
 //! A surface with boundary is doubled, as in the flow; a field has one value a vertex of the surface. Where the boundary is free,
 //! u = 0 there and curvature need not add up to anything.
 
+use super::placement::dot;
 use crate::flow::delaunay::Delaunay;
 use crate::flow::doubled::Doubled;
 use crate::flow::metric::{Evaluation, Metric};
 use crate::flow::ricci::FlowError;
+use crate::flow::ricci::moved;
 use crate::flow::ricci::system::{Hessian, System, Unknowns};
 use crate::geometry::ids::{NONE, VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, triangle_area};
@@ -21,8 +23,10 @@ use crate::geometry::mesh::{Mesh, triangle_area};
 /// Shifts of the Laplacian in the difference quotient for self-energies; the area is 1. The relative error is the square of the shift over
 /// the first eigenvalue; what rounding adds is below 1e-11 for the first. The others are for surfaces so long that the first is too large.
 const SHIFTS: [f64; 3] = [1e-3, 1e-5, 1e-7];
-/// Steps towards the log scale that the mesh really has.
-const CHORD_STEPS: usize = 4;
+/// Looks at the curvature that a log scale really has, at most.
+const LOOKS: usize = 10;
+/// Standard deviation of a step, relative to that of the log scale, after which the next would be far smaller.
+const REST: f64 = 1e-2;
 
 /// A surface's Laplacian, factorised, and its area.
 pub(super) struct Picture {
@@ -32,6 +36,8 @@ pub(super) struct Picture {
     original: VertexVec<VertexId>,
     /// 1 where the curvature of the double counts for one vertex of the surface, ½ on the boundary, 0 where u stays.
     share: Vec<f64>,
+    /// False where u = 0, by vertices of the double.
+    prescribed: VertexVec<bool>,
     /// Copies of the surface in the double: 1 or 2.
     copies: f64,
     /// Area of each vertex (a third of its faces), all together 1.
@@ -102,6 +108,7 @@ impl Picture {
             curvature: curvature.collect(),
             share: share.collect(),
             original,
+            prescribed,
             system,
             copies,
             weight: area,
@@ -163,36 +170,69 @@ impl Picture {
             .collect()
     }
 
-    /// The log scale for which the *mesh* has the curvature `target` (one a vertex, radians), from one near it, as far as some steps with
-    /// the factor of the linear picture lead. Angles are those of the Delaunay triangulation at every u, as in the flow.
+    /// The log scale for which the *mesh* has the curvature `target` (one a vertex, radians), from one near it, as far as some Newton steps
+    /// lead. Angles are those of the Delaunay triangulation at every u, and a step is taken when the energy fell, both as in the flow.
     pub(super) fn corrected(&mut self, start: &[f64], target: &[f64]) -> Vec<f64> {
-        let mut u = start.to_vec();
-        let mut evaluation = Evaluation::default();
+        let of = |&v: &VertexId| (target[v.index()], self.share[v.index()]);
+        let target: VertexVec<(f64, f64)> = self.original.iter().map(of).collect();
         let mut delaunay = self.delaunay.clone();
+        let mut metric = Metric::flipping(&mut delaunay);
+        let mut evaluation = Evaluation::default();
+        // The nearest so far, with the square of what is missing there; the direction from there, and how far it is tried.
+        let mut nearest = self.on_double(start);
         let mut least = f64::INFINITY;
-        for _ in 0..=CHORD_STEPS {
-            let doubled: VertexVec<f64> = self.original.iter().map(|v| u[v.index()]).collect();
-            Metric::flipping(&mut delaunay).evaluate(&doubled, &mut evaluation);
-            let reached = evaluation.curvature.iter().zip(&self.share);
-            let mut missing: Vec<f64> = reached
-                .zip(target)
-                .map(|((k, share), target)| {
-                    if *share > 0.0 {
-                        target - share * k
-                    } else {
-                        0.0
-                    }
-                })
+        let mut direction = VertexVec::filled(0.0, nearest.len());
+        let mut length = 1.0;
+        let mut system = None;
+        for _ in 0..LOOKS {
+            let u = moved(&nearest, &direction, length);
+            metric.evaluate(&u, &mut evaluation);
+            let reached = evaluation.curvature.iter().zip(target.iter());
+            let residual: VertexVec<f64> = reached
+                .map(|(k, &(target, share))| if share > 0.0 { k - target / share } else { 0.0 })
                 .collect();
-            let error = missing.iter().map(|k| k * k).sum::<f64>();
-            if error.is_nan() || error >= least {
-                break;
+            let error = dot(residual.as_slice(), residual.as_slice());
+            let slope = dot(residual.as_slice(), direction.as_slice());
+            if error.is_nan() || (slope > 0.0 && error > 0.8 * least) {
+                length *= 0.5;
+                continue;
             }
-            least = error;
-            self.solve(&mut missing);
-            u.iter_mut().zip(&missing).for_each(|(u, step)| *u += step);
+            (nearest, least) = (u, least.min(error));
+            // The factor of the linear picture is good enough for a small step.
+            let mut chord: Vec<f64> = residual
+                .iter()
+                .take(self.len())
+                .zip(&self.share)
+                .map(|(r, share)| -r * share)
+                .collect();
+            self.solve(&mut chord);
+            let own = &nearest.as_slice()[..self.len()];
+            if self.variance(&chord) < REST * REST * self.variance(own) {
+                return own.iter().zip(&chord).map(|(u, step)| u + step).collect();
+            }
+            let unknowns = Unknowns {
+                connectivity: metric.connectivity(),
+                prescribed: &self.prescribed,
+                shares: &self.original,
+                scale_free: self.prescribed.iter().all(|&p| p),
+                flips: metric.flips(),
+            };
+            let Ok(mut fresh) = System::new(&unknowns, system.take()) else {
+                break;
+            };
+            let hessian = fresh.assemble(metric.connectivity(), &metric.edge_weights(&evaluation));
+            let Some(next) = fresh.direction(&hessian, 0.0, &residual) else {
+                break;
+            };
+            system = Some(fresh);
+            (direction, length) = (next, 1.0);
         }
-        u
+        nearest.as_slice()[..self.len()].to_vec()
+    }
+
+    /// A field of the surface on both its copies.
+    fn on_double(&self, field: &[f64]) -> VertexVec<f64> {
+        self.original.iter().map(|v| field[v.index()]).collect()
     }
 
     /// ∫ of a field over the surface, whose area is 1.

@@ -131,7 +131,8 @@ impl Quadratic {
         self.within(&ranges, limits.total)
     }
 
-    fn within(&self, ranges: &[[f64; 2]], total: Option<f64>) -> Option<Best> {
+    /// The least energy with every curvature in a range of its own.
+    pub(super) fn within(&self, ranges: &[[f64; 2]], total: Option<f64>) -> Option<Best> {
         let count = self.len();
         let has_total = total.is_some() && count > 0;
         let mut c = vec![0.0; count];

@@ -9,7 +9,7 @@
 
 use super::Found;
 use super::area::Points;
-use super::moves::{self, Arrangement, Rule};
+use super::arrangement::{Arrangement, Rule};
 use super::placement::{Choice, Placement, Site};
 use super::quadratic::Limits;
 use crate::geometry::mesh::Mesh;
@@ -244,7 +244,7 @@ fn best_place(
                 -c * (2.0 * e + c * placement.self_energy[v])
             };
             let taken = |v: usize| !placement.allowed[v] || others.iter().any(|s| s.vertex == v);
-            let (vertex, gain) = placement.climb(None, taken, worth)?;
+            let &(vertex, gain) = placement.climb(None, taken, worth).first()?;
             Some((vertex, k, rest - gain))
         })
         .reduce(|a, b| if b.2 < a.2 { b } else { a })
@@ -260,8 +260,8 @@ pub(super) fn lower_distortion(
     found.cost = f64::INFINITY;
     for _ in 0..ROUNDS {
         let (vertices, curvature) = (&found.vertices, &found.curvature);
-        let now = moves::lower_distortion(placement, mesh, vertices, curvature, Rule::Fixed);
-        if now.value >= found.cost * (1.0 - LEAST_GAIN) {
+        let now = placement.lower_distortion(mesh, vertices, curvature, Rule::Fixed);
+        if now.value() >= found.cost * (1.0 - LEAST_GAIN) {
             break;
         }
         let curvature = transfer(placement.points(), &now, quanta);
@@ -282,7 +282,7 @@ pub(super) fn lower_distortion(
 fn transfer(points: Points, now: &Arrangement, quanta: Quanta) -> Vec<f64> {
     let answers = now.answers();
     let mut k: Vec<i64> = now
-        .curvature
+        .curvature()
         .iter()
         .map(|c| (c / quanta.size).round() as i64)
         .collect();

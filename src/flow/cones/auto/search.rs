@@ -13,8 +13,10 @@ use super::placement::{Choice, Placement};
 const COARSE_GAIN: f64 = 1e-2;
 /// … and at the end, for the right vertex: below this places differ by less than an edge.
 const FINE_GAIN: f64 = 1e-4;
-/// Most rounds of adding and taking away.
-const ROUNDS: usize = 3;
+/// How many cones are added, as shares of their number, before as many are taken away again.
+const MORE: [f64; 3] = [1.0, 0.5, 0.25];
+/// The same at the least.
+const LEAST_MORE: usize = 2;
 /// A cone is idle that lowers the standard deviation of the log scale by less than this share …
 const IDLE: f64 = 0.01;
 /// … and so is every one where it is below this without.
@@ -23,65 +25,108 @@ const NOTHING: f64 = 1e-6;
 const ROUNDING: f64 = 1e-7;
 /// Vertices of all searches from a first cone of their own.
 const STARTS: usize = 20_000;
-/// Passes of exchanges over all cones.
-const PASSES: usize = 12;
+/// Passes of exchanges over all cones, each of which must gain.
+const PASSES: usize = 24;
+/// The same while there are more cones than asked for.
+const MANY_PASSES: usize = 3;
+/// Moves whose columns share one sweep of back-substitutions.
+const TOGETHER: usize = 8;
+
+/// A cone's move to one of some vertices.
+struct Move {
+    /// Which cone.
+    cone: usize,
+    /// The least energy that is promised.
+    energy: f64,
+    vertices: Vec<usize>,
+}
+
 impl Placement<'_> {
     /// Moves cones one by one to where they are worth most, anywhere or (`nearby`) uphill from where they are, until none gains more than
-    /// `least_gain` of the energy.
-    pub(super) fn exchange(&mut self, mut choice: Choice, least_gain: f64, nearby: bool) -> Choice {
-        let count = choice.sites.len();
-        // Cones that stayed where they were since anything moved.
-        let (mut stayed, mut next) = (0, 0);
-        let mut looked = 0;
-        while stayed < count && looked < PASSES * count {
-            looked += 1;
-            let from = nearby.then(|| choice.sites[next].vertex);
-            let moved = self.without(&choice, next).and_then(|rest| {
-                let vertices = self.best_additions(&rest, from).into_iter();
-                let vertices: Vec<usize> = vertices
-                    .filter(|v| v.1 <= choice.energy * (1.0 - least_gain))
-                    .map(|v| v.0)
-                    .collect();
-                self.with_one_of(&rest.sites, next, &vertices)
-            });
-            match moved.filter(|moved| moved.energy < choice.energy * (1.0 - least_gain)) {
-                Some(moved) => {
-                    choice = moved;
-                    stayed = 0;
-                }
-                None => stayed += 1,
+    /// `least_gain` of the energy, in at most so many passes over all cones.
+    fn exchange(
+        &mut self,
+        mut choice: Choice,
+        least_gain: f64,
+        nearby: bool,
+        passes: usize,
+    ) -> Choice {
+        for _ in 0..passes {
+            let promised = self.promised_moves(&choice, least_gain, nearby);
+            let moved = promised
+                .chunks(TOGETHER)
+                .find_map(|some| self.make_moves(&choice, some, least_gain));
+            match moved {
+                Some(moved) => choice = moved,
+                None => break,
             }
-            next = (next + 1) % count;
         }
         choice
     }
 
+    /// What each cone alone promises to gain elsewhere, the best first, if it is more than `least_gain` of the energy.
+    fn promised_moves(&self, choice: &Choice, least_gain: f64, nearby: bool) -> Vec<Move> {
+        let goal = choice.energy * (1.0 - least_gain);
+        let moves = (0..choice.sites.len()).filter_map(|cone| {
+            let from = nearby.then(|| choice.sites[cone].vertex);
+            let mut found = self.best_additions(&self.without(choice, cone)?, from);
+            found.retain(|v| v.1 <= goal);
+            Some(Move {
+                cone,
+                energy: found.iter().map(|v| v.1).reduce(f64::min)?,
+                vertices: found.iter().map(|v| v.0).collect(),
+            })
+        });
+        let mut moves: Vec<Move> = moves.collect();
+        // Stable: of equals the first cone.
+        moves.sort_by(|a, b| a.energy.total_cmp(&b.energy));
+        moves
+    }
+
+    /// Makes those of some moves that gain enough one after another; `None` where none does.
+    fn make_moves(&mut self, choice: &Choice, moves: &[Move], least_gain: f64) -> Option<Choice> {
+        // All columns take one sweep of back-substitutions.
+        let columns: Vec<usize> = moves.iter().flat_map(|m| m.vertices.clone()).collect();
+        self.sites(&columns);
+        let mut best: Option<Choice> = None;
+        for Move { cone, vertices, .. } in moves {
+            let now = best.as_ref().unwrap_or(choice);
+            let goal = now.energy * (1.0 - least_gain);
+            // One that moved before may have come to the same place, or have made this move worthless.
+            let taken = |v: &usize| now.sites.iter().any(|s| s.vertex == *v);
+            let free: Vec<usize> = vertices.iter().copied().filter(|v| !taken(v)).collect();
+            let rest = self.without(now, *cone);
+            let moved = rest.and_then(|rest| self.with_one_of(&rest.sites, *cone, &free));
+            if let Some(moved) = moved.filter(|moved| moved.energy < goal) {
+                best = Some(moved);
+            }
+        }
+        best
+    }
+
     /// `count` cones, or fewer where there are no more places.
     ///
-    /// Exchange finds a local optimum. So as many cones again are added, the least valuable of all are taken away, and cones are
-    /// exchanged once more, as long as that helps.
+    /// Exchange finds a local optimum. So more cones are added, all are exchanged, the least valuable are taken away, and what is
+    /// left is exchanged once more. Many more and few more lead out of different optima.
     pub(super) fn search(&mut self, count: usize) -> Option<Choice> {
         if count == 0 {
             return self.choose(Vec::new());
         }
         let mut choice = self.first_choice(count)?;
-        for _ in 0..ROUNDS {
-            let more = self.grow(choice.clone(), 2 * count.max(2));
-            let Some(fewer) = self.prune(more, count) else {
-                break;
+        for share in MORE {
+            let more = ((share * count as f64) as usize).max(LEAST_MORE);
+            let many = self.grow(choice.clone(), count + more);
+            let many = self.exchange(many, COARSE_GAIN, false, MANY_PASSES);
+            let Some(fewer) = self.prune(many, count) else {
+                continue;
             };
-            let other = self.exchange(fewer, COARSE_GAIN, false);
-            let gained = choice.energy - other.energy;
-            let go_on = gained > COARSE_GAIN * choice.energy;
-            if gained > 0.0 {
+            let other = self.exchange(fewer, COARSE_GAIN, false, PASSES);
+            // Ways that end at the same places differ by rounding.
+            if other.energy < choice.energy * (1.0 - ROUNDING) {
                 choice = other;
             }
-            if !go_on {
-                break;
-            }
         }
-        choice = self.exchange_pairs(choice, COARSE_GAIN);
-        Some(self.exchange(choice, FINE_GAIN, false))
+        Some(self.exchange(choice, FINE_GAIN, false, PASSES))
     }
 
     /// From nothing to cones that no single move improves much. On a small mesh, where that is cheap, the first cone is put at several places
@@ -100,8 +145,7 @@ impl Placement<'_> {
                 continue;
             };
             let start = self.grow(start, count);
-            let choice = self.exchange(start, COARSE_GAIN, false);
-            // Starts that end at the same places differ by rounding.
+            let choice = self.exchange(start, COARSE_GAIN, false, PASSES);
             let is_better = |b: &Choice| choice.energy < b.energy * (1.0 - ROUNDING);
             if best.as_ref().is_none_or(is_better) {
                 best = Some(choice);
@@ -110,11 +154,20 @@ impl Placement<'_> {
         best
     }
 
-    /// Adds the best vertex again and again.
+    /// Adds the best vertices, several at once as long as they are tops of different hills: what is not worth its place leaves by exchange.
     fn grow(&mut self, mut choice: Choice, count: usize) -> Choice {
         while choice.sites.len() < count {
-            let Some(next) = self.add(&choice) else { break };
-            choice = next;
+            let mut new = self.additions(&choice, None, TOGETHER);
+            // Stable: of equals the first found.
+            new.sort_by(|a, b| a.1.total_cmp(&b.1));
+            new.truncate(count - choice.sites.len());
+            let vertices: Vec<usize> = new.iter().map(|v| v.0).collect();
+            let mut sites = choice.sites.clone();
+            sites.extend(self.sites(&vertices));
+            match self.choose(sites) {
+                Some(next) if !vertices.is_empty() => choice = next,
+                _ => break,
+            }
         }
         choice
     }
@@ -130,7 +183,7 @@ impl Placement<'_> {
     /// The best curvatures at these places and near them, after u without cones has changed.
     pub(super) fn settle(&mut self, choice: Choice) -> Option<Choice> {
         let weighed = self.choose(choice.sites)?;
-        Some(self.exchange(weighed, FINE_GAIN, true))
+        Some(self.exchange(weighed, FINE_GAIN, true, PASSES))
     }
 
     /// Takes away cones that do not pay, as long as more than `least` are left: those without which the standard deviation of the log
@@ -159,9 +212,9 @@ impl Placement<'_> {
         let mut choice = self.search(least)?;
         while self.largest_deviation(&choice) > bound && choice.sites.len() < most {
             let Some(more) = self.add(&choice) else { break };
-            choice = self.exchange(more, COARSE_GAIN, false);
+            choice = self.exchange(more, COARSE_GAIN, false, PASSES);
         }
-        Some(self.exchange(choice, FINE_GAIN, false))
+        Some(self.exchange(choice, FINE_GAIN, false, PASSES))
     }
 
     /// max |u − mean| over the faces, u of a face being that of its corners on average.
