@@ -17,6 +17,8 @@ const FINE_GAIN: f64 = 1e-4;
 const MORE: [f64; 3] = [1.0, 0.5, 0.25];
 /// The same at the least.
 const LEAST_MORE: usize = 2;
+/// How often that is gone through at most, as long as it helps.
+const CYCLES: usize = 3;
 /// A cone is idle that lowers the standard deviation of the log scale by less than this share …
 const IDLE: f64 = 0.01;
 /// … and so is every one where it is below this without.
@@ -113,20 +115,33 @@ impl Placement<'_> {
             return self.choose(Vec::new());
         }
         let mut choice = self.first_choice(count)?;
-        for share in MORE {
-            let more = ((share * count as f64) as usize).max(LEAST_MORE);
-            let many = self.grow(choice.clone(), count + more);
-            let many = self.exchange(many, COARSE_GAIN, false, MANY_PASSES);
-            let Some(fewer) = self.prune(many, count) else {
-                continue;
-            };
-            let other = self.exchange(fewer, COARSE_GAIN, false, PASSES);
-            // Ways that end at the same places differ by rounding.
-            if other.energy < choice.energy * (1.0 - ROUNDING) {
-                choice = other;
+        for _ in 0..CYCLES {
+            let before = choice.energy;
+            for share in MORE {
+                choice = self.detour(choice, share);
+            }
+            if choice.energy == before {
+                break;
             }
         }
         Some(self.exchange(choice, FINE_GAIN, false, PASSES))
+    }
+
+    /// Adds a share more cones, exchanges all, takes away as many, and exchanges what is left; keeps that if it is better.
+    fn detour(&mut self, choice: Choice, share: f64) -> Choice {
+        let count = choice.sites.len();
+        let more = ((share * count as f64) as usize).max(LEAST_MORE);
+        let many = self.grow(choice.clone(), count + more);
+        let many = self.exchange(many, COARSE_GAIN, false, MANY_PASSES);
+        let Some(fewer) = self.prune(many, count) else {
+            return choice;
+        };
+        let other = self.exchange(fewer, COARSE_GAIN, false, PASSES);
+        // Ways that end at the same places differ by rounding.
+        match other.energy < choice.energy * (1.0 - ROUNDING) {
+            true => other,
+            false => choice,
+        }
     }
 
     /// From nothing to cones that no single move improves much. On a small mesh, where that is cheap, the first cone is put at several places
