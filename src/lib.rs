@@ -71,6 +71,7 @@ pub mod observe;
 pub mod outcome;
 pub mod product;
 pub mod read;
+pub mod rebuild;
 pub mod repair;
 pub mod report;
 pub mod verify;
