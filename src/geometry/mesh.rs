@@ -361,16 +361,16 @@ pub fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 /// Distance of a point from a segment, in any dimension.
-pub fn distance_to_segment<const N: usize>(
-    p: [f64; N],
-    a: [f64; N],
-    b: [f64; N],
-) -> f64 {
+pub fn distance_to_segment<const N: usize>(p: [f64; N], a: [f64; N], b: [f64; N]) -> f64 {
     let dot = |x: [f64; N], y: [f64; N]| -> f64 { x.iter().zip(y).map(|(x, y)| x * y).sum() };
     let minus = |x: [f64; N], y: [f64; N]| -> [f64; N] { std::array::from_fn(|i| x[i] - y[i]) };
     let (along, from) = (minus(b, a), minus(p, a));
     let length2 = dot(along, along);
-    let t = if length2 > 0.0 { (dot(from, along) / length2).clamp(0.0, 1.0) } else { 0.0 };
+    let t = if length2 > 0.0 {
+        (dot(from, along) / length2).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
     let off: [f64; N] = std::array::from_fn(|i| from[i] - t * along[i]);
     dot(off, off).sqrt()
 }

@@ -84,7 +84,12 @@ pub(super) fn triangulate(
     };
     for [i, k] in lattice.full_cells() {
         let w = frame.width;
-        let at = [w * k + i, w * k + i + 1, w * (k + 1) + i + 1, w * (k + 1) + i];
+        let at = [
+            w * k + i,
+            w * k + i + 1,
+            w * (k + 1) + i + 1,
+            w * (k + 1) + i,
+        ];
         let p = [(i, k), (i + 1, k), (i + 1, k + 1), (i, k + 1)]
             .map(|(i, k)| patch.position[frame.index(i, k)].map(f64::from));
         let [a, b, c, d] = at.map(&mut numbered);
@@ -208,7 +213,9 @@ impl Lattice {
                 let at = width * k + i;
                 let has_corners = i + 1 < width && k + 1 < height;
                 full[at] &= has_corners
-                    && [at, at + 1, at + width, at + width + 1].iter().all(|&c| good[c]);
+                    && [at, at + 1, at + width, at + width + 1]
+                        .iter()
+                        .all(|&c| good[c]);
             }
         }
         Self {

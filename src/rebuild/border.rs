@@ -136,7 +136,10 @@ fn check(id: usize, seam: &Seam, frames: &[Frame]) -> Result<(), RebuildError> {
             samples: seam.samples.len(),
         });
     }
-    let patches: Vec<PatchId> = [Some(seam.left), seam.right].into_iter().flatten().collect();
+    let patches: Vec<PatchId> = [Some(seam.left), seam.right]
+        .into_iter()
+        .flatten()
+        .collect();
     if let Some(stray) = patches.iter().find(|p| p.index() >= frames.len()) {
         return Err(RebuildError::SeamPatch {
             seam: id,
@@ -206,7 +209,11 @@ fn close(
         let turn = |&i: &usize| {
             let forth = sides[i].direction(&seams[sides[i].seam], false);
             let turn = (back - forth).rem_euclid(TAU);
-            if turn < SAME_DIRECTION { turn + TAU } else { turn }
+            if turn < SAME_DIRECTION {
+                turn + TAU
+            } else {
+                turn
+            }
         };
         let Some(found) = free.min_by(|a, b| turn(a).total_cmp(&turn(b))) else {
             let end = frame.texel(side.end(seam).0);

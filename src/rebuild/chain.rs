@@ -69,7 +69,12 @@ impl<'a> Chain<'a> {
         let texel: Vec<[[f64; 2]; 2]> = seam
             .samples
             .iter()
-            .map(|s| [left.texel(s.left), right.map_or([f64::NAN; 2], |r| r.texel(s.right))])
+            .map(|s| {
+                [
+                    left.texel(s.left),
+                    right.map_or([f64::NAN; 2], |r| r.texel(s.right)),
+                ]
+            })
             .collect();
         let sides = 1 + usize::from(right.is_some());
         let mut along = vec![0.0];
@@ -163,7 +168,10 @@ impl<'a> Chain<'a> {
             }
             Some(sample) => {
                 // The last sample that is not beyond the middle.
-                let i = self.along.partition_point(|&x| x <= middle).checked_sub(1)?;
+                let i = self
+                    .along
+                    .partition_point(|&x| x <= middle)
+                    .checked_sub(1)?;
                 let (start, end) = (self.along[i], *self.along.get(i + 1)?);
                 let fraction = (middle - start) / (end - start);
                 if !(fraction > 0.0 && fraction < 1.0) {

@@ -69,7 +69,8 @@ pub(super) fn cells_along(a: [f64; 2], b: [f64; 2]) -> impl Iterator<Item = [i64
             true => (a[1], b[1]),
             false => (at(column as f64 - WIDER), at(column as f64 + 1.0 + WIDER)),
         };
-        let rows = (first.min(last) - WIDER).floor() as i64..=(first.max(last) + WIDER).floor() as i64;
+        let rows =
+            (first.min(last) - WIDER).floor() as i64..=(first.max(last) + WIDER).floor() as i64;
         rows.map(move |row| [column, row])
     })
 }
@@ -84,13 +85,12 @@ fn meet(polygon: &[[f64; 2]], [i, j]: [usize; 2]) -> bool {
         return folds(at(j), at(0), at(1));
     }
     let (a, b, c, d) = (at(i), at(i + 1), at(j), at(j + 1));
-    let apart = |k: usize| {
-        a[k].max(b[k]) < c[k].min(d[k]) || c[k].max(d[k]) < a[k].min(b[k])
-    };
+    let apart = |k: usize| a[k].max(b[k]) < c[k].min(d[k]) || c[k].max(d[k]) < a[k].min(b[k]);
     if apart(0) || apart(1) {
         return false;
     }
-    orientation(a, b, c) * orientation(a, b, d) <= 0 && orientation(c, d, a) * orientation(c, d, b) <= 0
+    orientation(a, b, c) * orientation(a, b, d) <= 0
+        && orientation(c, d, a) * orientation(c, d, b) <= 0
 }
 
 /// Whether the edges a–b and b–c have more in common than b.
@@ -123,7 +123,15 @@ mod tests {
         let bowtie = [[0.0, 0.0], [4.0, 4.0], [4.0, 0.0], [0.0, 4.0]];
         assert_eq!(crossings(&bowtie, &bowtie), [[0, 2]]);
         // A closed slit from the left side.
-        let slit = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0], [0.0, 2.0], [2.0, 2.0], [0.0, 2.0]];
+        let slit = [
+            [0.0, 0.0],
+            [4.0, 0.0],
+            [4.0, 4.0],
+            [0.0, 4.0],
+            [0.0, 2.0],
+            [2.0, 2.0],
+            [0.0, 2.0],
+        ];
         assert_eq!(crossings(&slit, &slit), brute(&slit));
         assert!(crossings(&slit, &slit).contains(&[4, 5]));
         let touching = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [2.0, 0.0], [0.0, 4.0]];
@@ -134,13 +142,16 @@ mod tests {
     fn the_search_agrees_with_all_pairs() {
         let mut state = 7u64;
         let mut random = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
             (state >> 40) as f64 / (1u64 << 24) as f64
         };
         for size in [3.0, 30.0] {
             for _ in 0..40 {
-                let polygon: Vec<[f64; 2]> =
-                    (0..25).map(|_| [size * random(), (4.0 * size * random()).round() / 4.0]).collect();
+                let polygon: Vec<[f64; 2]> = (0..25)
+                    .map(|_| [size * random(), (4.0 * size * random()).round() / 4.0])
+                    .collect();
                 assert_eq!(crossings(&polygon, &polygon), brute(&polygon));
             }
         }

@@ -32,8 +32,16 @@ pub enum RebuildError {
         /// Of its linear part.
         determinant: f64,
     },
+    /// Positions cannot be placed in space.
+    #[error("image_origin holds {value}; it must be finite")]
+    OriginNotFinite {
+        /// The number.
+        value: f64,
+    },
     /// A texel inside a patch without a position.
-    #[error("the texel in column {column}, row {row} of patch {patch} has the position {value}; it must be finite")]
+    #[error(
+        "the texel in column {column}, row {row} of patch {patch} has the position {value}; it must be finite"
+    )]
     TexelNotFinite {
         /// Patch.
         patch: usize,

@@ -35,7 +35,9 @@ impl Frame {
         }
         let [[a, b, c], [d, e, f]] = patch.texel_to_patch;
         let determinant = a * e - b * d;
-        let finite = [a, b, c, d, e, f, 1.0 / determinant].iter().all(|x| x.is_finite());
+        let finite = [a, b, c, d, e, f, 1.0 / determinant]
+            .iter()
+            .all(|x| x.is_finite());
         if !(finite && determinant < 0.0) {
             return Err(RebuildError::Transform {
                 patch: id,

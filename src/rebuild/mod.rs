@@ -26,12 +26,14 @@ mod crossing;
 mod error;
 mod frame;
 mod stitch;
+mod stored;
 mod thin;
 
 #[cfg(test)]
 mod tests;
 
 pub use error::RebuildError;
+pub use stored::rebuild_stored;
 
 use crate::atlas::geometry_image::GeometryImage;
 use crate::atlas::patches::{PatchLayout, Seam};
@@ -98,6 +100,38 @@ pub struct Rebuilt {
     pub patch_uv: Vec<[[f64; 2]; 3]>,
     /// Counted on the mesh.
     pub topology: Topology,
+}
+
+impl Rebuilt {
+    /// Compares the mesh's topology with the one it must have.
+    ///
+    /// # Errors
+    /// The first number that differs.
+    pub fn expect_topology(
+        &self,
+        euler_characteristic: i64,
+        genus: i64,
+        boundary_loops: i64,
+    ) -> Result<(), RebuildError> {
+        let own = self.topology;
+        let rows = [
+            (
+                "Euler characteristic",
+                own.euler_characteristic,
+                euler_characteristic,
+            ),
+            ("genus", own.genus, genus),
+            ("boundary loops", own.boundary_loops as i64, boundary_loops),
+        ];
+        match rows.into_iter().find(|(_, found, stated)| found != stated) {
+            Some((what, found, stated)) => Err(RebuildError::Topology {
+                what,
+                found,
+                stated,
+            }),
+            None => Ok(()),
+        }
+    }
 }
 
 /// Rebuilds the surface.

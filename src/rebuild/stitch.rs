@@ -7,7 +7,7 @@ use super::band::Band;
 use super::border::Borders;
 use super::chain::Chain;
 use super::frame::Frame;
-use super::{Images, Rebuilt, RebuildError};
+use super::{Images, RebuildError, Rebuilt};
 use crate::geometry::connectivity::Connectivity;
 use rustc_hash::FxHashMap;
 
@@ -75,7 +75,10 @@ pub(super) fn stitch(
             mesh.vertex.push(of_chain[seam][point]);
             mesh.uv.push(band.polygon.uv[i]);
             let i = i as u32;
-            chords.insert([base + i, base + (i + 1) % n], band.polygon.chord[i as usize]);
+            chords.insert(
+                [base + i, base + (i + 1) % n],
+                band.polygon.chord[i as usize],
+            );
         }
         let (image, frame) = (&images.patches[id], &frames[id]);
         for &at in &band.texels {
@@ -88,7 +91,8 @@ pub(super) fn stitch(
         }
         let first = mesh.faces.len();
         suspects.extend(first..first + band.band_faces);
-        mesh.faces.extend(band.faces.iter().map(|f| f.map(|c| base + c)));
+        mesh.faces
+            .extend(band.faces.iter().map(|f| f.map(|c| base + c)));
         mesh.patch.resize(mesh.faces.len(), id as u32);
     }
     let mut thin = ThinPlaces {
@@ -219,7 +223,9 @@ impl ThinPlaces<'_> {
             }
         }
         let p = image.position[best?.1];
-        Some(std::array::from_fn(|x| f64::from(p[x]) + self.images.origin[x]))
+        Some(std::array::from_fn(|x| {
+            f64::from(p[x]) + self.images.origin[x]
+        }))
     }
 }
 
@@ -230,9 +236,11 @@ impl Stitched {
             .iter()
             .map(|f| f.map(|c| self.vertex[c as usize]))
             .collect();
-        let connectivity = Connectivity::from_faces(&faces, self.positions.len())
-            .map_err(|error| RebuildError::NotManifold {
-                problem: error.to_string(),
+        let connectivity =
+            Connectivity::from_faces(&faces, self.positions.len()).map_err(|error| {
+                RebuildError::NotManifold {
+                    problem: error.to_string(),
+                }
             })?;
         Ok(Rebuilt {
             topology: connectivity.topology(),

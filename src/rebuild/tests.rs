@@ -74,7 +74,10 @@ fn check(s: &Sample, laid: &Laid) -> (Rebuilt, f64) {
     let (v, e, f, loops) = count(&mesh);
     let expected = s.mesh.connectivity.topology();
     let chi = v as i64 - e as i64 + f as i64;
-    assert_eq!((chi, loops), (expected.euler_characteristic, expected.boundary_loops));
+    assert_eq!(
+        (chi, loops),
+        (expected.euler_characteristic, expected.boundary_loops)
+    );
     assert_eq!(mesh.topology.genus, expected.genus);
     let mut area = vec![0.0; laid.layout.patches.len()];
     for (uv, &patch) in mesh.patch_uv.iter().zip(&mesh.face_patch) {
@@ -87,7 +90,10 @@ fn check(s: &Sample, laid: &Laid) -> (Rebuilt, f64) {
         let faces = s.mesh.connectivity.faces();
         let of_patch = faces.filter(|&f| laid.layout.face_patch[f].index() == p);
         let exact: f64 = of_patch.map(|f| doubled_area(laid.layout.uv[f])).sum();
-        assert!((area / exact - 1.0).abs() < 0.2, "patch {p}: {area} of {exact}");
+        assert!(
+            (area / exact - 1.0).abs() < 0.2,
+            "patch {p}: {area} of {exact}"
+        );
     }
     let faces = s.mesh.connectivity.to_faces();
     let surface = Triangles {
@@ -149,7 +155,13 @@ fn cylinder(columns: usize, rows: usize) -> Sample {
         })
         .collect();
     let on_cut = move |v: u32| (v as usize) <= rows;
-    build(&faces, positions, uv, move |a, b| on_cut(a) && on_cut(b), [0.0; 2])
+    build(
+        &faces,
+        positions,
+        uv,
+        move |a, b| on_cut(a) && on_cut(b),
+        [0.0; 2],
+    )
 }
 
 #[test]
@@ -160,7 +172,10 @@ fn a_cylinder_closes_across_its_cut() {
         let (_, off) = check(&s, &lay(&s, texels));
         errors.push(off);
     }
-    assert!(errors[3] < 1e-3 && errors[3] < 0.1 * errors[0], "{errors:?}");
+    assert!(
+        errors[3] < 1e-3 && errors[3] < 0.1 * errors[0],
+        "{errors:?}"
+    );
 }
 
 /// An annulus in the plane, with a slit: its sides lie on each other, the patch touches itself.
@@ -189,7 +204,13 @@ fn annulus(columns: usize, rows: usize, turn: f64) -> Sample {
         })
         .collect();
     let on_cut = move |v: u32| (v as usize) <= rows;
-    build(&faces, positions, uv, move |a, b| on_cut(a) && on_cut(b), [0.0; 2])
+    build(
+        &faces,
+        positions,
+        uv,
+        move |a, b| on_cut(a) && on_cut(b),
+        [0.0; 2],
+    )
 }
 
 #[test]
@@ -227,6 +248,9 @@ fn seams_are_shared() {
         assert!(seen.insert(p.map(f64::to_bits)), "{p:?} twice");
     }
     // On the cut and on both boundary circles all vertices lie on the surface's edges.
-    let on_cut = mesh.positions.iter().filter(|p| distance(**p, [1.0, 0.0, p[2]]) < 1e-12);
+    let on_cut = mesh
+        .positions
+        .iter()
+        .filter(|p| distance(**p, [1.0, 0.0, p[2]]) < 1e-12);
     assert!(on_cut.count() > 5);
 }

@@ -42,7 +42,11 @@ pub(super) fn thin<'a>(
             let patches = [Some(seam.left), seam.right].into_iter().flatten();
             let most = patches.map(|p| most_edges(&frames[p.index()]));
             let mut chain = Chain::new(seam, frames);
-            subdivide(&mut chain, ends[0] == ends[1], most.fold(f64::INFINITY, f64::min));
+            subdivide(
+                &mut chain,
+                ends[0] == ends[1],
+                most.fold(f64::INFINITY, f64::min),
+            );
             chain
         })
         .collect();
@@ -64,7 +68,11 @@ fn halve(chain: &Chain, a: &Point, b: &Point, may_interpolate: bool) -> Option<P
     if deviation.space > SPACE {
         return deviation.farthest_in_space.map(|i| chain.sample(i));
     }
-    let middle = || chain.middle(a, b).filter(|p| may_interpolate || p.fraction == 0.0);
+    let middle = || {
+        chain
+            .middle(a, b)
+            .filter(|p| may_interpolate || p.fraction == 0.0)
+    };
     (chain.length(a, b) > SPACING).then(middle).flatten()
 }
 
@@ -82,7 +90,12 @@ fn subdivide(chain: &mut Chain, returns: bool, most: f64) {
     let Some(mut at) = ahead.pop() else { return };
     points.push(at);
     while let Some(&next) = ahead.last() {
-        match halve(chain, &at, &next, ((points.len() + ahead.len()) as f64) < most) {
+        match halve(
+            chain,
+            &at,
+            &next,
+            ((points.len() + ahead.len()) as f64) < most,
+        ) {
             Some(between) => ahead.push(between),
             None => {
                 ahead.pop();
@@ -108,11 +121,7 @@ fn part_chords_with_the_same_ends(chains: &mut [Chain], borders: &Borders) {
 }
 
 /// Puts samples back until no border meets itself, or none is left to put back.
-fn untangle(
-    chains: &mut [Chain],
-    frames: &[Frame],
-    borders: &Borders,
-) -> Result<(), RebuildError> {
+fn untangle(chains: &mut [Chain], frames: &[Frame], borders: &Borders) -> Result<(), RebuildError> {
     let mut of_seam: Vec<Vec<usize>> = vec![Vec::new(); chains.len()];
     for (patch, border) in borders.loops.iter().enumerate() {
         for side in border {
@@ -154,9 +163,8 @@ fn tangled_chords(
     let polygon = polygon(&borders.loops[patch], chains);
     let n = polygon.texel.len();
     let frame = &frames[patch];
-    let edges = (0..n).map(|i| {
-        crate::atlas::plane::distance(polygon.texel[i], polygon.texel[(i + 1) % n])
-    });
+    let edges =
+        (0..n).map(|i| crate::atlas::plane::distance(polygon.texel[i], polygon.texel[(i + 1) % n]));
     let (length, limit) = (edges.sum::<f64>(), 4.0 * most_edges(frame));
     if length > limit {
         return Err(RebuildError::BorderTooLong {
@@ -171,5 +179,9 @@ fn tangled_chords(
     if found.is_empty() && !is_counterclockwise(&polygon.uv) {
         return Ok(polygon.chord);
     }
-    Ok(found.into_iter().flatten().map(|i| polygon.chord[i]).collect())
+    Ok(found
+        .into_iter()
+        .flatten()
+        .map(|i| polygon.chord[i])
+        .collect())
 }

@@ -1,7 +1,7 @@
 //! The nearest triangle to a point, through a tree of boxes.
 
 use super::{Triangles, corners, normal};
-use crate::geometry::mesh::{bounding_box, sub};
+use crate::geometry::mesh::{bounding_box, distance_to_segment, sub};
 
 /// Most triangles in a leaf.
 const LEAF: usize = 4;
@@ -102,7 +102,10 @@ fn divide(triangles: &mut [[[f64; 3]; 3]], first: usize, nodes: &mut Vec<Node>) 
         high - low
     };
     let extents = [0, 1, 2].map(extent);
-    let axis = (0..3).fold(0, |best, i| if extents[i] > extents[best] { i } else { best });
+    let axis = (0..3).fold(
+        0,
+        |best, i| if extents[i] > extents[best] { i } else { best },
+    );
     let half = triangles.len() / 2;
     triangles.select_nth_unstable_by(half, |a, b| centre(a, axis).total_cmp(&centre(b, axis)));
     let (left, right) = triangles.split_at_mut(half);
@@ -129,15 +132,27 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 ///      /   \
 ///     a --- b
 /// ```
-pub(super) fn squared_distance(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> f64 {
+///
+/// A triangle without area is a segment or a point.
+pub(super) fn squared_distance(p: [f64; 3], t: [[f64; 3]; 3]) -> f64 {
+    let squared = squared_distance_by_region(p, t);
+    if squared.is_finite() {
+        return squared;
+    }
+    let sides = (0..3).map(|k| distance_to_segment(p, t[k], t[(k + 1) % 3]));
+    let nearest = sides.fold(f64::INFINITY, f64::min);
+    nearest * nearest
+}
+
+/// Not a number where the triangle has no area and the region is divided by it.
+fn squared_distance_by_region(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> f64 {
     let (ab, ac) = (sub(b, a), sub(c, a));
     let to = |q: [f64; 3]| {
         let d = sub(p, q);
         dot(d, d)
     };
-    let along = |from: [f64; 3], side: [f64; 3], t: f64| {
-        to(std::array::from_fn(|i| from[i] + t * side[i]))
-    };
+    let along =
+        |from: [f64; 3], side: [f64; 3], t: f64| to(std::array::from_fn(|i| from[i] + t * side[i]));
     let ap = sub(p, a);
     let (d1, d2) = (dot(ab, ap), dot(ac, ap));
     if d1 <= 0.0 && d2 <= 0.0 {

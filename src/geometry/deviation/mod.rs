@@ -85,7 +85,11 @@ pub fn deviation(a: Triangles<'_>, b: Triangles<'_>, sampling: Sampling) -> Opti
 }
 
 /// Area of a surface, and its samples against another.
-fn one_sided(surface: Triangles<'_>, other: &BoxTree, sampling: Sampling) -> Option<(f64, OneSided)> {
+fn one_sided(
+    surface: Triangles<'_>,
+    other: &BoxTree,
+    sampling: Sampling,
+) -> Option<(f64, OneSided)> {
     let mut total = 0.0;
     let up_to: Vec<f64> = surface
         .faces
@@ -106,7 +110,11 @@ fn one_sided(surface: Triangles<'_>, other: &BoxTree, sampling: Sampling) -> Opt
             sample_run(surface, other, &up_to, range, samples)
         })
         .collect();
-    let step = surface.positions.len().div_ceil(sampling.vertices.max(1)).max(1);
+    let step = surface
+        .positions
+        .len()
+        .div_ceil(sampling.vertices.max(1))
+        .max(1);
     let tested: Vec<[f64; 3]> = match sampling.vertices {
         0 => Vec::new(),
         _ => surface.positions.iter().copied().step_by(step).collect(),
