@@ -69,11 +69,16 @@ pub(super) fn triangulate(
         .map(|edge| edge.map(|at| number[at] as usize))
         .collect();
     let fixed: Vec<[usize; 2]> = chords.chain(outline).collect();
-    let mut faces = fill(&points, &fixed).ok_or(RebuildError::Triangulation {
+    let unfilled = |missing| RebuildError::Triangulation {
         patch: id,
-        missing: n,
-        edges: n,
-    })?;
+        missing,
+        edges: fixed.len(),
+    };
+    let mut faces = fill(&points, &fixed).ok_or_else(|| unfilled(fixed.len()))?;
+    let missing = missing_edges(&faces, &fixed);
+    if missing > 0 {
+        return Err(unfilled(missing));
+    }
     let band_faces = faces.len();
     let mut numbered = |at: usize| {
         if number[at] == u32::MAX {
@@ -100,7 +105,6 @@ pub(super) fn triangulate(
             faces.extend([[a, b, d], [b, c, d]]);
         }
     }
-    check(id, n, &faces)?;
     Ok(Band {
         polygon,
         texels,
@@ -344,26 +348,18 @@ fn fill(points: &[[f64; 2]], fixed: &[[usize; 2]]) -> Option<Vec<[u32; 3]>> {
     Some(faces)
 }
 
-/// The faces must be a surface whose border is the polygon of the first `n` points.
-fn check(id: usize, n: usize, faces: &[[u32; 3]]) -> Result<(), RebuildError> {
-    let mut open: FxHashMap<(u32, u32), u32> = FxHashMap::default();
+/// How many of the fixed edges, and of these only, faces do not end at. Whole cells fill what is beyond the outline.
+fn missing_edges(faces: &[[u32; 3]], fixed: &[[usize; 2]]) -> usize {
+    let mut open: FxHashMap<[u32; 2], u32> = FxHashMap::default();
     for f in faces {
         for k in 0..3 {
             let (a, b) = (f[k], f[(k + 1) % 3]);
-            match open.remove(&(b, a)) {
-                Some(_) => {}
-                None => *open.entry((a, b)).or_default() += 1,
+            if open.remove(&[b, a]).is_none() {
+                *open.entry([a, b]).or_default() += 1;
             }
         }
     }
-    let chord = |i: usize| (i as u32, ((i + 1) % n) as u32);
-    let missing = (0..n).filter(|&i| open.get(&chord(i)) != Some(&1)).count();
-    if missing > 0 || open.len() != n {
-        return Err(RebuildError::Triangulation {
-            patch: id,
-            missing: missing.max(open.len().abs_diff(n)),
-            edges: n,
-        });
-    }
-    Ok(())
+    let is_missing = |edge: &&[usize; 2]| open.get(&edge.map(|v| v as u32)) != Some(&1);
+    let missing = fixed.iter().filter(is_missing).count();
+    missing.max(open.len().abs_diff(fixed.len()))
 }

@@ -105,11 +105,16 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Texels of the finer side between two points, along the seam.
+    /// Texels of the finer side from the first sample on, along the seam.
     fn place(&self, p: &Point) -> f64 {
         let next = (p.sample + 1).min(self.along.len() - 1);
         let (a, b) = (self.along[p.sample], self.along[next]);
         a + p.fraction * (b - a)
+    }
+
+    /// Texels of the finer side between two points, along the seam.
+    pub fn along(&self, a: &Point, b: &Point) -> f64 {
+        self.place(b) - self.place(a)
     }
 
     /// Texels of the finer side between two points, straight.

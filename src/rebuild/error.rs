@@ -110,7 +110,7 @@ pub enum RebuildError {
     },
     /// The border of a patch has a gap.
     #[error(
-        "the seams do not close around patch {patch}: where seam {seam} ends, no seam begins (the nearest begins {gap:.3e} texels away)"
+        "the seams do not close around patch {patch}: where seam {seam} ends, no seam begins (the nearest begins {gap:.3} texels away)"
     )]
     BorderGap {
         /// Patch.
@@ -164,14 +164,14 @@ pub enum RebuildError {
     },
     /// The triangles of a patch do not end at its border.
     #[error(
-        "patch {patch} could not be triangulated: {missing} of the {edges} edges of its border are missing; please report this with the folder"
+        "patch {patch} could not be triangulated: {missing} of the {edges} edges between its border and its whole cells are missing; please report this with the folder"
     )]
     Triangulation {
         /// Patch.
         patch: usize,
-        /// Edges of the border without a face.
+        /// Fixed edges without a face.
         missing: usize,
-        /// Edges of the border.
+        /// Edges of the border and around the whole cells.
         edges: usize,
     },
     /// More vertices than indices.

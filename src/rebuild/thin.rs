@@ -59,8 +59,18 @@ fn most_edges(frame: &Frame) -> f64 {
     EDGES_A_TEXEL * (frame.width * frame.height) as f64 + FEW_EDGES
 }
 
-/// Where a chord needs another point, and which.
+/// Where a chord needs another point, and which. Long pieces are halved first, so that each sample is looked at a few times only.
 fn halve(chain: &Chain, a: &Point, b: &Point, may_interpolate: bool) -> Option<Point> {
+    const LONG: f64 = 4.0 * SPACING;
+    let middle = || {
+        let middle = chain.middle(a, b);
+        middle.filter(|p| may_interpolate || p.fraction == 0.0)
+    };
+    if chain.along(a, b) > LONG
+        && let Some(middle) = middle()
+    {
+        return Some(middle);
+    }
     let deviation = chain.deviation(a, b);
     if deviation.plane > PLANE {
         return deviation.farthest.map(|i| chain.sample(i));
@@ -68,11 +78,6 @@ fn halve(chain: &Chain, a: &Point, b: &Point, may_interpolate: bool) -> Option<P
     if deviation.space > SPACE {
         return deviation.farthest_in_space.map(|i| chain.sample(i));
     }
-    let middle = || {
-        chain
-            .middle(a, b)
-            .filter(|p| may_interpolate || p.fraction == 0.0)
-    };
     (chain.length(a, b) > SPACING).then(middle).flatten()
 }
 

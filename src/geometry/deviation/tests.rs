@@ -5,6 +5,15 @@ use super::*;
 use crate::geometry::mesh::distance_to_segment;
 use std::f64::consts::{FRAC_PI_2, PI};
 
+/// A number in [0, 1) that depends on nothing but `i` (the finaliser of SplitMix64).
+fn uniform(i: u64) -> f64 {
+    let mut z = i.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^= z >> 31;
+    (z >> 11) as f64 / (1u64 << 53) as f64
+}
+
 /// Distance from the plane's foot where it lies inside, and else from the sides: another way than the tree's.
 fn brute_distance(p: [f64; 3], t: [[f64; 3]; 3]) -> f64 {
     let sides = (0..3).map(|k| distance_to_segment(p, t[k], t[(k + 1) % 3]));
