@@ -46,7 +46,7 @@ const PIECEWISE_LINEAR: [&str; 5] = [
     "bunny-closed.off",
     "rocker-arm.obj",
     "three-holes.off",
-    "nefertiti.obj",
+    "kitten.obj",
 ];
 
 const SAMPLING: Sampling = Sampling {

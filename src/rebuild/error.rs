@@ -84,7 +84,8 @@ pub enum RebuildError {
     },
     /// A sample that is not on its patch.
     #[error(
-        "sample {sample} of seam {seam} lies at column {column:.1}, row {row:.1} of patch {patch}, whose image has {width} columns and {height} rows"
+        "sample {sample} of seam {seam} lies at column {}, row {} of patch {patch}, whose image has {width} columns and {height} rows",
+        texels(*column), texels(*row)
     )]
     SeamOutside {
         /// Seam.
@@ -110,7 +111,7 @@ pub enum RebuildError {
     },
     /// The border of a patch has a gap.
     #[error(
-        "the seams do not close around patch {patch}: where seam {seam} ends, no seam begins (the nearest begins {gap:.3} texels away)"
+        "the seams do not close around patch {patch}: where seam {seam} ends, no seam begins (the nearest begins {} texels away)", texels(*gap)
     )]
     BorderGap {
         /// Patch.
@@ -132,7 +133,8 @@ pub enum RebuildError {
     },
     /// A border that is longer than any on that many texels.
     #[error(
-        "the border of patch {patch} is {length:.0} texels long, more than the {limit:.0} that an image of {width} columns and {height} rows can need"
+        "the border of patch {patch} is {} texels long, more than the {} that an image of {width} columns and {height} rows can need",
+        texels(*length), texels(*limit)
     )]
     BorderTooLong {
         /// Patch.
@@ -200,4 +202,12 @@ pub enum RebuildError {
         /// Of the surface.
         stated: i64,
     },
+}
+
+/// A number of texels for a reader: short however large it is.
+fn texels(x: f64) -> String {
+    match x.abs() < 1e6 {
+        true => format!("{:.3}", x),
+        false => format!("{x:.3e}"),
+    }
 }

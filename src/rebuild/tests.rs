@@ -254,3 +254,133 @@ fn seams_are_shared() {
         .filter(|p| distance(**p, [1.0, 0.0, p[2]]) < 1e-12);
     assert!(on_cut.count() > 5);
 }
+
+/// The same patches on images of a few texels, far fewer than any layout gives.
+fn coarsen(s: &Sample, laid: &Laid, columns: usize) -> Laid {
+    let mut layout = laid.layout.clone();
+    for (id, patch) in layout.patches.iter_mut().enumerate() {
+        let faces = s.mesh.connectivity.faces();
+        let of_patch = faces.filter(|&f| layout.face_patch[f].index() == id);
+        let corners = of_patch.flat_map(|f| laid.layout.uv[f]);
+        let height = corners.map(|p| p[1]).fold(0.0, f64::max);
+        let d = columns as f64;
+        let rows = (d * height).ceil().max(1.0);
+        (patch.width, patch.height) = (columns + 2, rows as usize + 2);
+        patch.texel_to_patch = [[1.0 / d, 0.0, -1.0 / d], [0.0, -1.0 / d, (rows + 1.0) / d]];
+    }
+    let images = sample(&s.mesh, &layout, &s.log_scale, laid.origin);
+    Laid {
+        layout,
+        images,
+        origin: laid.origin,
+    }
+}
+
+/// Where texels are wider than a patch there is only its border: still a surface of the right topology, and no face is flipped. A
+/// patch that meets itself has edges from a vertex to itself there, which get a vertex in their middle.
+#[test]
+fn patches_thinner_than_a_texel() {
+    let samples = [
+        samples::square(9),
+        samples::ramp(60, 6, 6.0),
+        cylinder(90, 20),
+        annulus(60, 8, 0.3),
+    ];
+    for s in &samples {
+        let laid = lay(s, 3000);
+        for columns in [1, 2, 3, 5, 8, 13] {
+            let coarse = coarsen(s, &laid, columns);
+            let mesh = rebuild(&coarse.images()).unwrap();
+            let (v, e, f, loops) = count(&mesh);
+            let expected = s.mesh.connectivity.topology();
+            let chi = v as i64 - e as i64 + f as i64;
+            assert_eq!(
+                (chi, loops),
+                (expected.euler_characteristic, expected.boundary_loops)
+            );
+            for uv in &mesh.patch_uv {
+                assert!(doubled_area(*uv) > 0.0, "{columns}: flipped {uv:?}");
+            }
+        }
+    }
+}
+
+/// Two vertices of the surface at one point stay two.
+#[test]
+fn vertices_at_one_point_stay_apart() {
+    let mut s = cylinder(40, 10);
+    // The cylinder is pinched: its two boundary circles touch each other in one point.
+    let n = s.mesh.positions.len();
+    let (a, b) = (20 * 11, 20 * 11 + 10);
+    assert!(b < n);
+    let p = s.mesh.positions.as_slice()[a];
+    s.mesh.positions.as_mut_slice()[b] = p;
+    let mesh = rebuild(&lay(&s, 2000).images()).unwrap();
+    let (.., loops) = count(&mesh);
+    assert_eq!((mesh.topology.euler_characteristic, loops), (0, 2));
+}
+
+/// Whatever is damaged, the answer is a surface or a reason.
+#[test]
+fn damaged_images_and_seams_never_panic() {
+    let sources = [
+        samples::ramp(30, 4, 5.0),
+        cylinder(30, 8),
+        annulus(30, 5, 0.4),
+    ];
+    let mut state = 11u64;
+    let mut random = move |bound: usize| {
+        state ^= state >> 12;
+        state ^= state << 25;
+        state ^= state >> 27;
+        (state.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 33) as usize % bound.max(1)
+    };
+    let (mut made, mut refused) = (0, 0);
+    for s in &sources {
+        let whole = lay(s, 600);
+        for _ in 0..250 {
+            let mut layout = whole.layout.clone();
+            let mut images = whole.images.clone();
+            let extremes = [f64::NAN, f64::INFINITY, 1e300, -1.0, 0.0, 1e-300, 0.5];
+            for _ in 0..1 + random(3) {
+                let seam = random(layout.seams.len());
+                let patch = random(layout.patches.len());
+                let texel = random(images[patch].alpha.len());
+                let seams = layout.seams.len();
+                let chain = &mut layout.seams[seam];
+                if chain.samples.is_empty() {
+                    continue;
+                }
+                let sample = random(chain.samples.len());
+                match random(12) {
+                    0 => chain.samples[sample].left[random(2)] = extremes[random(7)],
+                    1 => chain.samples[sample].right[random(2)] = extremes[random(7)],
+                    2 => chain.samples[sample].position[random(3)] = extremes[random(7)],
+                    3 => chain.samples[sample].left[random(2)] += 0.2,
+                    4 => chain.samples.truncate(sample),
+                    5 => chain.samples.reverse(),
+                    6 => chain.right = None,
+                    7 => chain.left = crate::geometry::ids::PatchId::new(random(4)),
+                    8 => drop(layout.seams.remove(random(seams))),
+                    9 => images[patch].alpha[texel..].fill([0.0, 1.0, f32::NAN][random(3)]),
+                    10 => layout.patches[patch].texel_to_patch[random(2)][random(3)] *= 3.0,
+                    _ => images[patch].position[texel][random(3)] = f32::NAN,
+                }
+                if layout.seams.is_empty() {
+                    break;
+                }
+            }
+            match rebuild(&Images::new(&layout, &images, whole.origin)) {
+                Ok(mesh) => {
+                    count(&mesh);
+                    made += 1;
+                }
+                Err(error) => {
+                    assert!(error.to_string().len() < 400, "{error}");
+                    refused += 1;
+                }
+            }
+        }
+    }
+    assert!(made > 50 && refused > 200, "{made} made, {refused} refused");
+}
