@@ -14,8 +14,9 @@
 //!
 //! Every arrow is a function from finished values to a finished value; [`job`] is the page on which they
 //! stand in order. Dependencies point one way: `geometry` ← `flow` ← `atlas` ← `product` ← `report`,
-//! `export`; `read` and `repair` know `geometry` only; [`verify`] reads what was written and shares no
-//! code with the stages that made it.
+//! `export`; `read` and `repair` know `geometry` only; [`rebuild`] makes a mesh again from images and seams alone, in memory for
+//! `report` and from a folder for the command; [`verify`] reads what was written and shares no
+//! code with the stages that made it (but the readers of file formats in `read`).
 //!
 //! ```
 //! use affine_atlas::{build, config::Config, geometry::mesh::Soup};
@@ -60,6 +61,7 @@
 //! * D. Glickenstein. *Discrete conformal variations and scalar curvature on piecewise flat manifolds.* J. Differential Geom. 87, 2011.
 //! * J. Erickson, K. Whittlesey. *Greedy optimal homotopy and homology generators.* SODA 2005.
 //! * X. Gu, S. Gortler, H. Hoppe. *Geometry images.* SIGGRAPH 2002.
+//! * P. Sander, Z. Wood, S. Gortler, J. Snyder, H. Hoppe. *Multi-chart geometry images.* SGP 2003.
 
 pub mod atlas;
 pub mod config;
@@ -71,6 +73,7 @@ pub mod observe;
 pub mod outcome;
 pub mod product;
 pub mod read;
+pub mod rebuild;
 pub mod repair;
 pub mod report;
 pub mod verify;

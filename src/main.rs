@@ -9,13 +9,17 @@ use affine_atlas::config::Config;
 use affine_atlas::config::assets::Asset;
 use affine_atlas::export::folder::remove_all_staging;
 use affine_atlas::export::manifest::{Manifest, Record};
+use affine_atlas::job::rebuild::RebuildAssetError;
 use affine_atlas::job::survey::folder_name as survey_folder;
 use affine_atlas::job::{self, BuildError};
 use affine_atlas::observe::Observer;
 use affine_atlas::outcome::{AssetOutcome, Failure, FailureKind};
 use affine_atlas::read::{self, ReadParams};
 use affine_atlas::verify::{self, SourceSurface, VerifyOptions};
-use cli::work::{Inspection, SurveyRequest, Surveyed, VerifyRequest, VerifyResult, Work};
+use cli::work::{
+    Inspection, RebuildRequest, RebuildResult, SurveyRequest, Surveyed, VerifyRequest,
+    VerifyResult, Work,
+};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -27,6 +31,7 @@ const WORK: Work = Work {
     survey,
     survey_folder,
     verify,
+    rebuild,
     remove_staging: remove_all_staging,
 };
 
@@ -114,5 +119,16 @@ fn verify(request: &VerifyRequest) -> Result<VerifyResult, Failure> {
         text: verdicts.to_string(),
         failed: verdicts.failed(),
         json: serde_json::json!(verdicts),
+    })
+}
+
+fn rebuild(request: &RebuildRequest) -> Result<RebuildResult, Failure> {
+    let asset = job::rebuild::rebuild(&request.folder, request.against.as_deref());
+    let asset = asset.map_err(|error| Failure::from(&error))?;
+    let glb = asset.glb();
+    Ok(RebuildResult {
+        glb: glb.map_err(|error| Failure::from(&RebuildAssetError::from(error)))?,
+        text: asset.to_string(),
+        json: asset.json(),
     })
 }

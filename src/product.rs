@@ -104,10 +104,14 @@ pub struct Quality {
     pub holonomy_error: f64,
     /// Worst mismatch of the cocycle over shared faces, relative to the chart's diameter.
     pub cocycle_error: f64,
-    /// 20 log10(bounding-box diagonal / RMS distance) of the surface rebuilt from the images; absent where not measured.
+    /// 20 log10(bounding-box diagonal / symmetric RMS distance) of the mesh rebuilt from the images to the surface as it came
+    /// in, estimated over samples; absent where not measured.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub image_psnr_db: Option<f64>,
-    /// Largest distance between the surface and the one rebuilt from the images; absent where not measured.
+    /// Largest distance between the two over samples and vertices on both, source units: a lower bound of the Hausdorff distance.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub image_hausdorff: Option<f64>,
+    /// Angle between normals of the two, radians; near creases the largest is large however near the surfaces are.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub image_normal_error: Option<MeanMax>,
 }

@@ -3,6 +3,10 @@
 //! *Enters:* mesh, flat lengths, cut, charts. *Leaves:* [`Quality`]: distortion (9), log scale, angle error, cut
 //! length, and the residuals of what makes the atlas affine: transitions, holonomy, cocycle.
 
+mod images;
+
+pub use images::measure_images;
+
 use crate::atlas::charts::{Chart, ChartKind, Charts, Transition};
 use crate::atlas::cut::CutGraph;
 use crate::atlas::develop::{Development, diameter};
@@ -19,7 +23,7 @@ use std::f64::consts::FRAC_PI_2;
 /// Bound below which a rotation counts as a quarter turn, radians.
 pub const QUARTER_TURN_TOLERANCE: f64 = 1e-8;
 
-/// Measures everything that can be measured before patches and images exist.
+/// Measures everything that can be measured before patches and images exist; [`measure_images`] adds the rest.
 pub fn measure(
     mesh: &Mesh,
     metric: &FlatMetric,
@@ -45,6 +49,7 @@ pub fn measure(
         cocycle_error: cocycle_error(mesh, cut, central, charts),
         image_psnr_db: None,
         image_hausdorff: None,
+        image_normal_error: None,
     }
 }
 

@@ -320,6 +320,20 @@ fn verify_without_a_folder() {
 }
 
 #[test]
+fn rebuild_without_a_folder_or_a_glb() {
+    let folder = folder();
+    insta::assert_snapshot!(refusal(folder.path(), &["rebuild", "nowhere", "-o", "a.glb"], 2), @r"
+    error: there is no folder nowhere
+    help: name a folder that `affine-atlas build` wrote
+    ");
+    insta::assert_snapshot!(refusal(folder.path(), &["rebuild", ".", "-o", "a.obj"], 2), @r"
+    error: a.obj does not end in .glb, the only format that meshes are written in
+    help: name the file with `--out MESH.glb`
+    ");
+    insta::assert_snapshot!(refusal(folder.path(), &["rebuild", ".", "-o", "a.glb"], 1), @"failed: . (input): . holds no atlas.json and no component-000; give the folder that `affine-atlas build` wrote for a mesh");
+}
+
+#[test]
 fn wrong_arguments_exit_with_2_and_help_with_0() {
     let folder = folder();
     for arguments in [
@@ -328,6 +342,7 @@ fn wrong_arguments_exit_with_2_and_help_with_0() {
         &["build", "--thread", "x"],
         &["build", "--threads", "1025"],
         &["verify"],
+        &["rebuild", "."],
         &["build", "-q", "-v"],
     ] {
         assert_eq!(
@@ -359,12 +374,13 @@ fn help() {
     Usage: affine-atlas [OPTIONS] <COMMAND>
 
     Commands:
-      build   Build an atlas of each mesh
-      check   Say what a build would do, and build nothing
-      cones   Show what more or fewer cones gain, and write lists of them
-      verify  Read atlases back and check every property they must have
-      init    Write a configuration file that explains every key
-      help    Print this message or the help of the given subcommand(s)
+      build    Build an atlas of each mesh
+      check    Say what a build would do, and build nothing
+      cones    Show what more or fewer cones gain, and write lists of them
+      verify   Read atlases back and check every property they must have
+      rebuild  Make a mesh again from the geometry images of an atlas
+      init     Write a configuration file that explains every key
+      help     Print this message or the help of the given subcommand(s)
 
     Options:
       -q, --quiet                Show errors only
@@ -460,7 +476,7 @@ fn help() {
 #[test]
 fn help_has_examples() {
     let folder = folder();
-    for command in ["build", "check", "cones", "verify", "init"] {
+    for command in ["build", "check", "cones", "verify", "rebuild", "init"] {
         for flag in ["-h", "--help"] {
             let text = stdout(&run(folder.path(), &[command, flag]));
             assert!(

@@ -142,6 +142,12 @@ mod tests {
                 message: String::new(),
             })
         },
+        rebuild: |_| {
+            Err(Failure {
+                kind: FailureKind::Input,
+                message: String::new(),
+            })
+        },
         remove_staging: || {},
     };
 

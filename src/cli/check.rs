@@ -73,6 +73,12 @@ fn write_region(path: &Path, glb: Option<&[u8]>) -> Result<String, Problem> {
             path.display()
         ));
     };
+    write_whole(path, glb)?;
+    Ok(format!("region: written to {}", path.display()))
+}
+
+/// Writes a file, complete or not at all; an older one is replaced.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Problem> {
     let not_written = |reason: std::io::Error| Problem::NotWritten {
         path: path.to_owned(),
         reason: reason.kind().to_string(),
@@ -84,10 +90,10 @@ fn write_region(path: &Path, glb: Option<&[u8]>) -> Result<String, Problem> {
     let mut file = super::init::builder()
         .tempfile_in(folder)
         .map_err(not_written)?;
-    file.write_all(glb).map_err(not_written)?;
+    file.write_all(bytes).map_err(not_written)?;
     file.persist(path)
         .map_err(|error| not_written(error.error))?;
-    Ok(format!("region: written to {}", path.display()))
+    Ok(())
 }
 
 /// One line on standard error.

@@ -11,6 +11,7 @@ mod panics;
 mod plan;
 mod problem;
 mod progress;
+mod rebuild;
 mod summary;
 mod terminal;
 mod verify;
@@ -67,6 +68,7 @@ fn run(arguments: &Arguments, work: &Work) -> Result<u8, Problem> {
         Command::Check(check) => check::run(check, global, work),
         Command::Cones(cones) => cones::run(cones, global, work),
         Command::Verify(verify) => verify::run(verify, global, work),
+        Command::Rebuild(rebuild) => rebuild::run(rebuild, global, work),
         Command::Init(init) => init::run(init, global),
     }
 }

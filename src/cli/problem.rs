@@ -30,6 +30,8 @@ pub enum Problem {
     NotWritten { path: PathBuf, reason: String },
     #[error("{} cannot be written: {reason}", path.display())]
     NotRecorded { path: PathBuf, reason: String },
+    #[error("{} does not end in .glb, the only format that meshes are written in", path.display())]
+    NotGlb { path: PathBuf },
     #[error("there is no folder {}", path.display())]
     NoFolder { path: PathBuf },
     #[error("the {given} threads of this run cannot be started: {reason}")]
@@ -63,6 +65,7 @@ impl Problem {
             Self::NotWritten { .. } | Self::NotRecorded { .. } => {
                 "check that its folder exists, may be written and has space left"
             }
+            Self::NotGlb { .. } => "name the file with `--out MESH.glb`",
             Self::NoFolder { .. } => "name a folder that `affine-atlas build` wrote",
             Self::Threads { .. } => "ask for fewer with `--threads`",
             Self::Internal(_) => return None,

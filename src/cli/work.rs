@@ -21,6 +21,8 @@ pub struct Work {
     pub survey_folder: fn(&str) -> String,
     /// Reads an output folder back and checks it.
     pub verify: fn(&VerifyRequest) -> Result<VerifyResult, Failure>,
+    /// Makes a mesh again from an asset's folder.
+    pub rebuild: fn(&RebuildRequest) -> Result<RebuildResult, Failure>,
     /// Removes folders that are being written. Called once before the program is stopped.
     pub remove_staging: fn(),
 }
@@ -77,4 +79,22 @@ pub struct VerifyResult {
     pub json: serde_json::Value,
     /// Checks that failed.
     pub failed: usize,
+}
+
+/// What `rebuild` is asked for.
+pub struct RebuildRequest {
+    /// An asset's folder.
+    pub folder: PathBuf,
+    /// A mesh to compare with.
+    pub against: Option<PathBuf>,
+}
+
+/// What `rebuild` made.
+pub struct RebuildResult {
+    /// The mesh.
+    pub glb: Vec<u8>,
+    /// Its figures: lines for a reader.
+    pub text: String,
+    /// The same for programs.
+    pub json: serde_json::Value,
 }

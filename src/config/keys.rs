@@ -414,12 +414,9 @@ pub const KEYS: &[Key] = &[
     ),
     key(
         "patches.min_side",
-        Kind::Integer {
-            min: 64,
-            max: 16384,
-        },
+        Kind::Integer { min: 8, max: 4096 },
         "texels",
-        "64",
+        "16",
     ),
     key(
         "patches.padding",

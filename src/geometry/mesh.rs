@@ -360,6 +360,21 @@ pub fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| a[i] - b[i])
 }
 
+/// Distance of a point from a segment, in any dimension.
+pub fn distance_to_segment<const N: usize>(p: [f64; N], a: [f64; N], b: [f64; N]) -> f64 {
+    let dot = |x: [f64; N], y: [f64; N]| -> f64 { x.iter().zip(y).map(|(x, y)| x * y).sum() };
+    let minus = |x: [f64; N], y: [f64; N]| -> [f64; N] { std::array::from_fn(|i| x[i] - y[i]) };
+    let (along, from) = (minus(b, a), minus(p, a));
+    let length2 = dot(along, along);
+    let t = if length2 > 0.0 {
+        (dot(from, along) / length2).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    let off: [f64; N] = std::array::from_fn(|i| from[i] - t * along[i]);
+    dot(off, off).sqrt()
+}
+
 /// Area of a triangle in space.
 pub fn triangle_area(p: [[f64; 3]; 3]) -> f64 {
     0.5 * norm(cross(sub(p[1], p[0]), sub(p[2], p[0])))
@@ -432,5 +447,13 @@ mod tests {
             assert!(mesh.source_face[f] < 2);
         }
         assert!((area - 4.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn distances_to_a_segment() {
+        let (a, b) = ([0.0, 0.0], [2.0, 0.0]);
+        assert_eq!(distance_to_segment([1.0, 3.0], a, b), 3.0);
+        assert_eq!(distance_to_segment([5.0, 4.0], a, b), 5.0);
+        assert_eq!(distance_to_segment([-3.0, -4.0], a, a), 5.0);
     }
 }

@@ -1,5 +1,7 @@
 //! Surfaces: ids, connectivity, positions, and formulas on single triangles.
 pub mod connectivity;
+pub mod deviation;
+pub(crate) mod disjoint_sets;
 pub mod ids;
 pub mod mesh;
 pub mod triangle;

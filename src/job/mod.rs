@@ -2,12 +2,13 @@
 //!
 //! `build_component` is the pipeline of the tutorial (5.1) on one page, its first half on another (`flatten`): data only
 //! flows forward, and a finished value is never changed. [`build`] does it for every component of a mesh in memory, [`run`] for a file,
-//! [`inspect`] stops before the flow, [`survey`] tries different cones.
+//! [`inspect`] stops before the flow, [`survey`] tries different cones, [`rebuild`] goes back from images to a mesh.
 
 mod error;
 mod flatten;
 mod inspect;
 mod listing;
+pub mod rebuild;
 pub mod survey;
 
 pub use error::BuildError;
@@ -21,11 +22,13 @@ use crate::config::Config;
 use crate::export::folder::{Staging, component_name, list_files};
 use crate::export::{self, ExportError, Provenance, pictures};
 use crate::flow::cones::{self, Requests};
+use crate::geometry::deviation::Triangles;
 use crate::geometry::mesh::Soup;
 use crate::observe::Observer;
 use crate::outcome::{AssetOutcome, AssetState, ComponentOutcome, Failure, Summary};
 use crate::product::AffineAtlas;
 use crate::read::{self, SourceAsset};
+use crate::rebuild::Images;
 use crate::repair::{self, Component};
 use crate::report;
 use std::path::Path;
@@ -85,6 +88,7 @@ fn build_component(
     enter("cones")?;
     let mesh = component.mesh?;
     let prescription = cones::prescribe(&mesh, requests, &config.cones, &config.boundary)?;
+    let (given, given_faces) = (mesh.positions.clone(), mesh.connectivity.to_faces());
     let Flattened {
         mesh,
         metric,
@@ -113,9 +117,16 @@ fn build_component(
     let image_origin = geometry_image::image_origin(&mesh);
     let images = geometry_image::sample(&mesh, &patches, &metric.log_scale, image_origin);
     enter("report")?;
+    let topology = mesh.connectivity.topology();
     let quality = report::measure(&mesh, &metric, &cut, &central, &charts, &prescription);
+    let given = Triangles {
+        positions: given.as_slice(),
+        faces: &given_faces,
+    };
+    let readable = Images::new(&patches, &images, image_origin);
+    let quality = report::measure_images(quality, given, &readable, topology);
     Ok(AffineAtlas {
-        topology: mesh.connectivity.topology(),
+        topology,
         seamless: report::is_seamless(&charts),
         repair: component.log.counts(),
         flow: config.flow.clone(),

@@ -17,14 +17,20 @@
 //! | `text` | lines, tokens and numbers of text formats |
 //! | `obj`, `off`, `ply`, `stl` | one format each |
 //! | `gltf` | glTF 2.0 and GLB with its compression extensions |
+//! | `atlas` | images and seams of a folder that a build wrote |
+//! | `npz`, `exr`, `bounded` | the formats in such a folder |
 //!
 //! The four small formats are read here rather than by crates: none that we know gives errors with
 //! line, index and count, keeps the file's own face order and polygon fans, and bounds its memory.
 
+pub mod atlas;
+pub(crate) mod bounded;
 mod build;
 mod error;
+pub(crate) mod exr;
 mod folder;
 mod gltf;
+pub(crate) mod npz;
 mod obj;
 mod off;
 mod ply;

@@ -3,7 +3,7 @@
 use super::Verdicts;
 use super::document::Document;
 use super::formulas::{Point2, Point3};
-use super::npz::{Element, Npz};
+use crate::read::npz::{Element, Npz};
 use std::path::Path;
 
 /// No vertex, segment or patch.

@@ -3,9 +3,10 @@
 
 use super::Verdicts;
 use super::arrays::Arrays;
-use super::document::{Document, read_bounded};
+use super::document::Document;
 use super::formulas::{Point2, Point3, bounds3, doubled_area2};
 use super::patches::{Overlap, find_overlap};
+use crate::read::bounded::read_bounded;
 use serde_json::Value;
 use std::path::Path;
 

@@ -2,36 +2,19 @@
 
 use super::Verdicts;
 use super::arrays::Arrays;
-use super::document::{Document, Patch, read_bounded};
+use super::document::{Document, Patch};
 use super::formulas::{Point2, Point3, Worst, diagonal3, mix3, norm3};
 use super::patches::Groups;
-use exr::prelude as openexr;
-use exr::prelude::{Compression, FlatSamples, MetaData, ReadChannels, ReadLayers};
+use crate::read::exr::{self, Image, Read};
 use rayon::prelude::*;
-use std::io::Cursor;
 use std::path::Path;
 
-/// Largest image file that is read (bytes).
-const SIZE_LIMIT: u64 = 1 << 32;
-/// No lossless compression of the contract makes data smaller than this; an image that claims more texels
-/// than its file can hold is refused before anything is allocated for it.
-const BEST_COMPRESSION: u64 = 1100;
 /// Largest distance between a texel and the surface point, in diagonals of the surface.
 const TEXEL_TOLERANCE: f64 = 1e-5;
 /// A texel counts as inside where its barycentric coordinates exceed this …
 const STRICTLY_INSIDE: f64 = 1e-6;
 /// … and as outside where it is further than this from every face (texels).
 const BORDER: f64 = 1e-4;
-
-/// The channels of an image.
-struct Image {
-    rgb: [Vec<f32>; 3],
-    alpha: Vec<f32>,
-    normal: Option<[Vec<f32>; 3]>,
-    face: Option<Vec<u32>>,
-    log_scale: Option<Vec<f32>>,
-    text: Option<String>,
-}
 
 /// What is measured of one image.
 #[derive(Default)]
@@ -157,107 +140,16 @@ fn report(document: &Document, tallies: &[Tally], verdicts: &mut Verdicts) {
 
 /// Reads an image; `None` where its size is not the stated one.
 fn read(path: &Path, patch: &Patch, tally: &mut Tally) -> Result<Option<Image>, String> {
-    let bytes = read_bounded(path, SIZE_LIMIT)?;
-    // The decoder is not ours: should it panic on hostile bytes, that is an unreadable image.
-    let decoded = std::panic::catch_unwind(|| decode(&bytes, patch));
-    let (image, layout) = decoded.unwrap_or_else(|_| Err("cannot be decoded".to_owned()))?;
-    tally.layout = layout;
-    tally.wrong_size = image.is_none();
-    Ok(image)
-}
-
-/// The image, and what of its layout is not as the contract has it.
-fn decode(bytes: &[u8], patch: &Patch) -> Result<(Option<Image>, Option<String>), String> {
-    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false)
-        .map_err(|error| error.to_string())?;
-    let [header] = meta.headers.as_slice() else {
-        return Err(format!("has {} parts, not one", meta.headers.len()));
-    };
-    if (header.layer_size.x(), header.layer_size.y()) != (patch.width, patch.height) {
-        return Ok((None, None));
+    match exr::read(path, [patch.width, patch.height])? {
+        Read::WrongSize(_) => {
+            tally.wrong_size = true;
+            Ok(None)
+        }
+        Read::Image { image, layout } => {
+            tally.layout = layout;
+            Ok(Some(*image))
+        }
     }
-    let channels = header.channels.list.len() as u64;
-    let texels = (patch.width as u64).saturating_mul(patch.height as u64);
-    let claimed = texels.saturating_mul(4 * channels);
-    if claimed > BEST_COMPRESSION.saturating_mul(bytes.len() as u64) {
-        return Err(format!(
-            "claims {texels} texels, more than its bytes can hold"
-        ));
-    }
-    let lossless = matches!(
-        header.compression,
-        Compression::ZIP16 | Compression::ZIP1 | Compression::RLE | Compression::Uncompressed
-    );
-    if header.deep || !lossless {
-        return Err(format!("is {}, not ZIP scan lines", header.compression));
-    }
-    let zip = matches!(header.compression, Compression::ZIP16 | Compression::ZIP1);
-    let is_tiled = matches!(header.blocks, exr::meta::BlockDescription::Tiles(_));
-    let mut layout = None;
-    if !zip || is_tiled {
-        layout = Some(format!("{} instead of ZIP scan lines", header.compression));
-    }
-    if header
-        .channels
-        .list
-        .iter()
-        .any(|c| c.sampling != openexr::Vec2(1, 1))
-    {
-        return Err("has subsampled channels".to_owned());
-    }
-    let decoded = openexr::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .first_valid_layer()
-        .all_attributes()
-        .non_parallel()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(|error| error.to_string())?;
-    let text = decoded
-        .layer_data
-        .attributes
-        .other
-        .iter()
-        .chain(&decoded.attributes.other)
-        .find(|(name, _)| **name == *"affineAtlas")
-        .and_then(|(_, value)| match value {
-            openexr::AttributeValue::Text(text) => Some(text.to_string()),
-            _ => None,
-        });
-    let mut list = decoded.layer_data.channel_data.list;
-    let texels = patch.width * patch.height;
-    let mut take = |name: &str| {
-        let at = list
-            .iter()
-            .position(|channel| channel.name.to_string() == name)?;
-        Some(list.swap_remove(at).sample_data).filter(|samples| samples.len() == texels)
-    };
-    let mut floats = |name: &str| match take(name) {
-        Some(FlatSamples::F32(values)) => Ok(values),
-        Some(_) => Err(format!("channel {name} is not 32-bit float")),
-        None => Err(format!("has no channel {name}")),
-    };
-    let rgb = [floats("R")?, floats("G")?, floats("B")?];
-    let alpha = floats("A")?;
-    let normal = match ["X", "Y", "Z"].map(|axis| floats(&format!("normal.{axis}"))) {
-        [Ok(x), Ok(y), Ok(z)] => Some([x, y, z]),
-        _ => None,
-    };
-    let log_scale = floats("surface.logScale").ok();
-    let face = match take("surface.face") {
-        Some(FlatSamples::U32(values)) => Some(values),
-        _ => None,
-    };
-    let image = Image {
-        rgb,
-        alpha,
-        normal,
-        face,
-        log_scale,
-        text,
-    };
-    Ok((Some(image), layout))
 }
 
 /// What is wrong with the text attribute.

@@ -3,8 +3,8 @@
 //! Enters: a folder that holds `atlas.json`, `atlas.npz`, `images/*.exr` and `surface.glb`, or components, or
 //! assets. Leaves: [`Verdicts`], one line a check with the measured figure.
 //!
-//! Guaranteed: shares no code with the stages that made the data (its own readers, halfedge pairing and
-//! formulas), tests every face, texel and sample, never panics and never allocates more than a fixed
+//! Guaranteed: shares no code with the stages that made the data (its own halfedge pairing and
+//! formulas, and readers that know file formats only), tests every face, texel and sample, never panics and never allocates more than a fixed
 //! multiple of what the files hold, whatever they hold. A check that could not run because its data is
 //! broken is preceded by the failed check that says so.
 //!
@@ -22,7 +22,6 @@ mod glb;
 mod grid;
 mod images;
 mod metric;
-mod npz;
 mod patches;
 mod quality;
 mod seams;
@@ -30,6 +29,7 @@ mod source;
 mod surface;
 mod transitions;
 
+use crate::read::bounded::is_inside;
 use serde::Serialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -240,7 +240,7 @@ fn verify_manifest(
                 continue;
             }
         };
-        let Some(id) = record["id"].as_str().filter(|id| document::is_inside(id)) else {
+        let Some(id) = record["id"].as_str().filter(|id| is_inside(id)) else {
             let figure = format!("line {} has no usable id", row + 1);
             verdicts.note("manifest.jsonl names its assets", false, figure);
             continue;
@@ -259,7 +259,7 @@ fn verify_manifest(
             .iter()
             .copied()
             .filter(|file| {
-                !document::is_inside(file)
+                !is_inside(file)
                     || !(folder.join(file).is_file() || folder.join(id).join(file).is_file())
             })
             .collect();

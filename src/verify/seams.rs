@@ -3,7 +3,9 @@
 use super::Verdicts;
 use super::arrays::{Arrays, NONE};
 use super::document::Document;
-use super::formulas::{Extent2, Point2, Point3, Worst, diagonal3, distance2, distance3, sub2};
+use super::formulas::{
+    Extent2, Point2, Point3, Worst, diagonal3, distance2, distance3, doubled_area2, sub2,
+};
 use super::grid::Grid;
 use super::surface::Surface;
 use rayon::prelude::*;
@@ -154,12 +156,63 @@ pub(super) fn check(
         ill == 0,
         ill,
     );
+    if document.is_generated() {
+        let (gap, area) = around_patches(arrays, document);
+        verdicts.note(
+            "seams close once around every patch",
+            gap.0 <= 1e-9 && area.0 <= 1e-6,
+            format!("gap {:.2e} of the patch, area off by {:.2e}", gap.0, area.0),
+        );
+    }
     let lost = unsampled_vertices(surface, arrays, &is_border, document.is_generated());
     verdicts.note(
         "seams sample every vertex of their chains",
         lost == 0,
         format!("{lost} vertices without a sample"),
     );
+}
+
+/// Walked with the patch on the left, its seams must add up to nothing and enclose the area of its faces: what they leave open,
+/// relative to the patch's extent, and the error of the area, relative to it.
+fn around_patches(arrays: &Arrays, document: &Document) -> (Worst, Worst) {
+    let count = document.patches.len();
+    let mut points: Vec<Vec<Point2>> = vec![Vec::new(); count];
+    let mut area = vec![0.0; count];
+    for (&patch, &uv) in arrays.patch.iter().zip(&arrays.patch_uv) {
+        if let Some(sum) = area.get_mut(patch as usize) {
+            *sum += doubled_area2(uv);
+            points[patch as usize].extend(uv);
+        }
+    }
+    let mut sum = vec![[0.0; 2]; count];
+    let mut enclosed = vec![0.0; count];
+    for (seam, patches) in arrays.seam_patch.iter().enumerate() {
+        for (side, &patch) in patches.iter().enumerate().filter(|(_, p)| **p != NONE) {
+            let patch = patch as usize;
+            let sign = if side == 0 { 1.0 } else { -1.0 };
+            // Seen from a point of the patch, so that nothing is lost.
+            let Some(&from) = points[patch].first() else {
+                continue;
+            };
+            for pair in arrays.seam_uv[arrays.seam_range(seam)].windows(2) {
+                let (a, b) = (pair[0][side], pair[1][side]);
+                enclosed[patch] += sign * doubled_area2([from, a, b]);
+                let step = sub2(b, a);
+                for (sum, step) in sum[patch].iter_mut().zip(step) {
+                    *sum += sign * step;
+                }
+            }
+        }
+    }
+    let (mut gap, mut off) = (Worst::default(), Worst::default());
+    for patch in 0..count {
+        let extent = Extent2::of(points[patch].iter().copied())
+            .diagonal()
+            .max(1e-300);
+        gap.see(distance2(sum[patch], [0.0; 2]) / extent);
+        off.see((enclosed[patch] / area[patch] - 1.0).abs());
+    }
+    (gap, off)
 }
 
 /// Border vertices at which no sample lies.

@@ -9,6 +9,7 @@ mod good;
 #[cfg(unix)]
 mod interrupt;
 mod prescriptions;
+mod rebuild;
 mod refusals;
 mod replacing;
 mod survey;

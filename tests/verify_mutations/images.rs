@@ -55,7 +55,8 @@ pub fn mutations() -> Vec<Mutation> {
                 "patches lie inside their images",
                 "seams run along every patch border",
                 "seams sample every vertex of their chains",
-                "texels outside every face are not marked"
+                "texels outside every face are not marked",
+                "seams close once around every patch"
             ]
         ),
         mutation!(
@@ -69,7 +70,8 @@ pub fn mutations() -> Vec<Mutation> {
             [
                 "every patch has faces",
                 "images describe themselves",
-                "texels outside every face are not marked"
+                "texels outside every face are not marked",
+                "seams close once around every patch"
             ]
         ),
         mutation!(
@@ -115,7 +117,8 @@ pub fn mutations() -> Vec<Mutation> {
                 "patches are similar to the central chart, positive, injective",
                 "patches keep flat lengths at their scale",
                 "texels hold the log scale",
-                "texels hold the surface point"
+                "texels hold the surface point",
+                "seams close once around every patch"
             ]
         ),
         mutation!(
@@ -315,7 +318,10 @@ pub fn mutations() -> Vec<Mutation> {
             torus,
             "a seam sample off in the plane",
             |a| a.arrays.seam_uv[5][1][0] += 1e-3,
-            ["seam samples hold the surface point on both sides"]
+            [
+                "seam samples hold the surface point on both sides",
+                "seams close once around every patch"
+            ]
         ),
         mutation!(
             tube,
@@ -338,7 +344,8 @@ pub fn mutations() -> Vec<Mutation> {
             |a| a.arrays.seam_uv[0][0] = [f64::NAN; 2],
             [
                 "seam coordinates are NaN beyond the surface's boundary only",
-                "seam samples hold the surface point on both sides"
+                "seam samples hold the surface point on both sides",
+                "seams close once around every patch"
             ]
         ),
         mutation!(
@@ -352,7 +359,10 @@ pub fn mutations() -> Vec<Mutation> {
                     .truncate(a.arrays.seam_position.len() - 2);
                 a.arrays.seam_uv.truncate(a.arrays.seam_uv.len() - 2);
             },
-            ["seams run along every patch border"]
+            [
+                "seams run along every patch border",
+                "seams close once around every patch"
+            ]
         ),
         mutation!(
             tube,
@@ -373,7 +383,10 @@ pub fn mutations() -> Vec<Mutation> {
                 a.arrays.seam_position.drain(2 * s..2 * s + 2);
                 a.arrays.seam_uv.drain(2 * s..2 * s + 2);
             },
-            ["seams run along the surface's boundary"]
+            [
+                "seams run along the surface's boundary",
+                "seams close once around every patch"
+            ]
         ),
         mutation!(
             torus,

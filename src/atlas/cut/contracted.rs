@@ -3,6 +3,7 @@
 use super::paths::{Search, Ways};
 use crate::flow::cones::Prescription;
 use crate::geometry::connectivity::Connectivity;
+use crate::geometry::disjoint_sets::UnionFind;
 use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, NONE, VertexId, VertexVec};
 
 /// Most roots that are tried for the homotopy basis of a surface with handles …
@@ -300,33 +301,5 @@ impl<'a> Contracted<'a> {
             .filter(|&(_, &cut)| cut)
             .map(|(e, _)| self.length[e])
             .sum()
-    }
-}
-
-/// Disjoint sets with path halving.
-struct UnionFind {
-    parent: Vec<u32>,
-}
-
-impl UnionFind {
-    fn new(count: usize) -> Self {
-        Self {
-            parent: (0..count as u32).collect(),
-        }
-    }
-
-    fn find(&mut self, mut a: usize) -> usize {
-        while self.parent[a] as usize != a {
-            self.parent[a] = self.parent[self.parent[a] as usize];
-            a = self.parent[a] as usize;
-        }
-        a
-    }
-
-    /// True where the two were apart before.
-    fn join(&mut self, a: usize, b: usize) -> bool {
-        let (a, b) = (self.find(a), self.find(b));
-        self.parent[a.max(b)] = a.min(b) as u32;
-        a != b
     }
 }

@@ -105,7 +105,8 @@ pub struct PatchParams {
     pub log_scale_range: f64,
     /// Texels of all images of a component together (about).
     pub texel_budget: usize,
-    /// Least texels on the longer side of an image.
+    /// Least texels on the longer side of an image. Beyond that a patch keeps some texels on its shorter side and inside,
+    /// so that a budget too small for all patches together is exceeded.
     pub min_side: usize,
     /// Texels between patches in the packed square, and around each image.
     pub padding: usize,
@@ -116,7 +117,7 @@ impl Default for PatchParams {
         Self {
             log_scale_range: 2.0,
             texel_budget: 512 * 512,
-            min_side: 64,
+            min_side: 16,
             padding: 2,
         }
     }

@@ -191,7 +191,7 @@ mod tests {
         let inside = |i: usize| r[i].density * r[i].density * patches[i].height;
         assert!((inside(0) / inside(1) / 4.0 - 1.0).abs() < 0.02);
         assert!((inside(1) / inside(2) - 1.0).abs() < 0.02);
-        assert_eq!(r[3].density, 64.0);
+        assert_eq!(r[3].density, params.min_side as f64);
         let total: f64 = (0..4).map(inside).sum();
         assert!((total / params.texel_budget as f64 - 1.0).abs() < 0.02);
     }

@@ -10,6 +10,7 @@
 //! so tiny faces may collapse; `atlas.npz` has the surface in full.
 
 mod materials;
+pub mod rebuilt;
 pub mod region;
 mod vertices;
 

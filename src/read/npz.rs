@@ -12,7 +12,7 @@ use zip::ZipArchive;
 const HEADER_LIMIT: usize = 1 << 16;
 
 /// A number type of the contract.
-pub(super) trait Element: Copy {
+pub(crate) trait Element: Copy {
     /// NumPy's names for it.
     const DESCR: &'static [&'static str];
     /// In words.
@@ -42,7 +42,7 @@ element!(u32, "uint32", "<u4");
 element!(u8, "uint8", "|u1", "<u1", "u1");
 
 /// An open container.
-pub(super) struct Npz {
+pub(crate) struct Npz {
     archive: ZipArchive<BufReader<File>>,
 }
 

@@ -1,0 +1,187 @@
+//! The nearest triangle to a point, through a tree of boxes.
+
+use super::{Triangles, corners, normal};
+use crate::geometry::mesh::{bounding_box, distance_to_segment, sub};
+
+/// Most triangles in a leaf.
+const LEAF: usize = 4;
+
+/// Triangles sorted into nested boxes: each node halves its triangles at the median of the widest axis of their centres.
+pub(super) struct BoxTree {
+    nodes: Vec<Node>,
+    /// Corners of the triangles, in the order of the leaves.
+    triangles: Vec<[[f64; 3]; 3]>,
+}
+
+struct Node {
+    low: [f64; 3],
+    high: [f64; 3],
+    /// First triangle of a leaf, or the second child; the first one follows its parent.
+    at: u32,
+    /// Triangles of a leaf; 0 for a node with children.
+    count: u32,
+}
+
+/// What is nearest to a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Nearest {
+    pub distance: f64,
+    /// Number in the tree.
+    pub face: usize,
+}
+
+impl BoxTree {
+    /// `None` where there are no triangles.
+    pub fn new(surface: Triangles<'_>) -> Option<Self> {
+        let mut triangles: Vec<_> = surface.faces.iter().map(|&f| corners(surface, f)).collect();
+        if triangles.is_empty() || triangles.len() > u32::MAX as usize / 2 {
+            return None;
+        }
+        let mut nodes = Vec::with_capacity(triangles.len());
+        divide(&mut triangles, 0, &mut nodes);
+        Some(Self { nodes, triangles })
+    }
+
+    /// Normal of a triangle, of any length.
+    pub fn normal(&self, face: usize) -> [f64; 3] {
+        normal(self.triangles[face])
+    }
+
+    /// The triangle nearest to a point. The search is quick where the triangle `near` is not far.
+    pub fn nearest(&self, p: [f64; 3], near: usize) -> Nearest {
+        let near = near.min(self.triangles.len() - 1);
+        let mut best = (squared_distance(p, self.triangles[near]), near);
+        let mut stack = vec![0];
+        while let Some(at) = stack.pop() {
+            let node = &self.nodes[at];
+            if squared_to_box(p, node) >= best.0 {
+                continue;
+            }
+            if node.count > 0 {
+                let first = node.at as usize;
+                for face in first..first + node.count as usize {
+                    let d = squared_distance(p, self.triangles[face]);
+                    if d < best.0 {
+                        best = (d, face);
+                    }
+                }
+            } else {
+                let (a, b) = (at + 1, node.at as usize);
+                let a_first =
+                    squared_to_box(p, &self.nodes[a]) <= squared_to_box(p, &self.nodes[b]);
+                stack.extend(if a_first { [b, a] } else { [a, b] });
+            }
+        }
+        Nearest {
+            distance: best.0.sqrt(),
+            face: best.1,
+        }
+    }
+}
+
+fn divide(triangles: &mut [[[f64; 3]; 3]], first: usize, nodes: &mut Vec<Node>) {
+    let (low, high) = bounding_box(triangles.as_flattened());
+    let at = nodes.len();
+    let is_leaf = triangles.len() <= LEAF;
+    nodes.push(Node {
+        low,
+        high,
+        at: first as u32,
+        count: if is_leaf { triangles.len() as u32 } else { 0 },
+    });
+    if is_leaf {
+        return;
+    }
+    // Three times the centres, which sort like them.
+    let centre = |t: &[[f64; 3]; 3], axis: usize| t[0][axis] + t[1][axis] + t[2][axis];
+    let extent = |axis: usize| {
+        let centres = triangles.iter().map(|t| centre(t, axis));
+        let (low, high) = centres.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
+            (a.min(x), b.max(x))
+        });
+        high - low
+    };
+    let extents = [0, 1, 2].map(extent);
+    let axis = (0..3).fold(
+        0,
+        |best, i| if extents[i] > extents[best] { i } else { best },
+    );
+    let half = triangles.len() / 2;
+    triangles.select_nth_unstable_by(half, |a, b| centre(a, axis).total_cmp(&centre(b, axis)));
+    let (left, right) = triangles.split_at_mut(half);
+    divide(left, first, nodes);
+    nodes[at].at = nodes.len() as u32;
+    divide(right, first + half, nodes);
+}
+
+fn squared_to_box(p: [f64; 3], node: &Node) -> f64 {
+    let off = |i: usize| (node.low[i] - p[i]).max(p[i] - node.high[i]).max(0.0);
+    (0..3).map(|i| off(i) * off(i)).sum()
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Squared distance of a point from a triangle: which of its corners, sides and inside is nearest follows from six
+/// products (Ericson, *Real-Time Collision Detection*, 5.1.5).
+///
+/// ```text
+///        c
+///       / \        u, v: how far p lies along ab and ac, seen from a (1, 2), b (3, 4) and c (5, 6)
+///      /   \
+///     a --- b
+/// ```
+///
+/// A triangle without area is a segment or a point.
+pub(super) fn squared_distance(p: [f64; 3], t: [[f64; 3]; 3]) -> f64 {
+    let squared = squared_distance_by_region(p, t);
+    if squared.is_finite() {
+        return squared;
+    }
+    let sides = (0..3).map(|k| distance_to_segment(p, t[k], t[(k + 1) % 3]));
+    let nearest = sides.fold(f64::INFINITY, f64::min);
+    nearest * nearest
+}
+
+/// Not a number where the triangle has no area and the region is divided by it.
+fn squared_distance_by_region(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> f64 {
+    let (ab, ac) = (sub(b, a), sub(c, a));
+    let to = |q: [f64; 3]| {
+        let d = sub(p, q);
+        dot(d, d)
+    };
+    let along =
+        |from: [f64; 3], side: [f64; 3], t: f64| to(std::array::from_fn(|i| from[i] + t * side[i]));
+    let ap = sub(p, a);
+    let (d1, d2) = (dot(ab, ap), dot(ac, ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return to(a);
+    }
+    let bp = sub(p, b);
+    let (d3, d4) = (dot(ab, bp), dot(ac, bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return to(b);
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return along(a, ab, d1 / (d1 - d3));
+    }
+    let cp = sub(p, c);
+    let (d5, d6) = (dot(ab, cp), dot(ac, cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return to(c);
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return along(a, ac, d2 / (d2 - d6));
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 >= d3 && d5 >= d6 {
+        let t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return along(b, sub(c, b), t);
+    }
+    let sum = va + vb + vc;
+    let (v, w) = (vb / sum, vc / sum);
+    to(std::array::from_fn(|i| a[i] + v * ab[i] + w * ac[i]))
+}

@@ -1,0 +1,142 @@
+//! Geometry images: `images/PPPP.exr` as the output contract has them.
+//!
+//! *Guaranteed:* whatever the file holds nothing panics, and memory is bounded by the size that the caller states
+//! and the bytes of the file.
+
+use super::bounded::read_bounded;
+use ::exr::prelude as openexr;
+use ::exr::prelude::{Compression, FlatSamples, MetaData, ReadChannels, ReadLayers};
+use std::io::Cursor;
+use std::path::Path;
+
+/// Largest image file that is read (bytes).
+const SIZE_LIMIT: u64 = 1 << 32;
+/// No lossless compression of the contract makes data smaller than this; an image that claims more texels
+/// than its file can hold is refused before anything is allocated for it.
+const BEST_COMPRESSION: u64 = 1100;
+
+/// The channels of an image.
+pub(crate) struct Image {
+    pub rgb: [Vec<f32>; 3],
+    pub alpha: Vec<f32>,
+    pub normal: Option<[Vec<f32>; 3]>,
+    pub face: Option<Vec<u32>>,
+    pub log_scale: Option<Vec<f32>>,
+    pub text: Option<String>,
+}
+
+/// What is in an image file.
+pub(crate) enum Read {
+    /// Columns and rows are not those that were stated, but these.
+    WrongSize([usize; 2]),
+    /// An image of the size that was stated.
+    Image {
+        image: Box<Image>,
+        /// What of its layout is not as the contract has it.
+        layout: Option<String>,
+    },
+}
+
+/// Reads an image of the size (columns, rows) that is stated elsewhere.
+pub(crate) fn read(path: &Path, size: [usize; 2]) -> Result<Read, String> {
+    let bytes = read_bounded(path, SIZE_LIMIT)?;
+    // The decoder is not ours: should it panic on hostile bytes, that is an unreadable image.
+    let decoded = std::panic::catch_unwind(|| decode(&bytes, size));
+    decoded.unwrap_or_else(|_| Err("cannot be decoded".to_owned()))
+}
+
+/// The image, and what of its layout is not as the contract has it.
+fn decode(bytes: &[u8], [width, height]: [usize; 2]) -> Result<Read, String> {
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false)
+        .map_err(|error| error.to_string())?;
+    let [header] = meta.headers.as_slice() else {
+        return Err(format!("has {} parts, not one", meta.headers.len()));
+    };
+    let size = [header.layer_size.x(), header.layer_size.y()];
+    if size != [width, height] {
+        return Ok(Read::WrongSize(size));
+    }
+    let channels = header.channels.list.len() as u64;
+    let texels = (width as u64).saturating_mul(height as u64);
+    let claimed = texels.saturating_mul(4 * channels);
+    if claimed > BEST_COMPRESSION.saturating_mul(bytes.len() as u64) {
+        return Err(format!(
+            "claims {texels} texels, more than its bytes can hold"
+        ));
+    }
+    let lossless = matches!(
+        header.compression,
+        Compression::ZIP16 | Compression::ZIP1 | Compression::RLE | Compression::Uncompressed
+    );
+    if header.deep || !lossless {
+        return Err(format!("is {}, not ZIP scan lines", header.compression));
+    }
+    let zip = matches!(header.compression, Compression::ZIP16 | Compression::ZIP1);
+    let is_tiled = matches!(header.blocks, ::exr::meta::BlockDescription::Tiles(_));
+    let mut layout = None;
+    if !zip || is_tiled {
+        layout = Some(format!("{} instead of ZIP scan lines", header.compression));
+    }
+    if header
+        .channels
+        .list
+        .iter()
+        .any(|c| c.sampling != openexr::Vec2(1, 1))
+    {
+        return Err("has subsampled channels".to_owned());
+    }
+    let decoded = openexr::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .non_parallel()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(|error| error.to_string())?;
+    let text = decoded
+        .layer_data
+        .attributes
+        .other
+        .iter()
+        .chain(&decoded.attributes.other)
+        .find(|(name, _)| **name == *"affineAtlas")
+        .and_then(|(_, value)| match value {
+            openexr::AttributeValue::Text(text) => Some(text.to_string()),
+            _ => None,
+        });
+    let mut list = decoded.layer_data.channel_data.list;
+    let texels = width * height;
+    let mut take = |name: &str| {
+        let at = list
+            .iter()
+            .position(|channel| channel.name.to_string() == name)?;
+        Some(list.swap_remove(at).sample_data).filter(|samples| samples.len() == texels)
+    };
+    let mut floats = |name: &str| match take(name) {
+        Some(FlatSamples::F32(values)) => Ok(values),
+        Some(_) => Err(format!("channel {name} is not 32-bit float")),
+        None => Err(format!("has no channel {name}")),
+    };
+    let rgb = [floats("R")?, floats("G")?, floats("B")?];
+    let alpha = floats("A")?;
+    let normal = match ["X", "Y", "Z"].map(|axis| floats(&format!("normal.{axis}"))) {
+        [Ok(x), Ok(y), Ok(z)] => Some([x, y, z]),
+        _ => None,
+    };
+    let log_scale = floats("surface.logScale").ok();
+    let face = match take("surface.face") {
+        Some(FlatSamples::U32(values)) => Some(values),
+        _ => None,
+    };
+    let image = Image {
+        rgb,
+        alpha,
+        normal,
+        face,
+        log_scale,
+        text,
+    };
+    let image = Box::new(image);
+    Ok(Read::Image { image, layout })
+}
