@@ -9,6 +9,7 @@ mod good;
 #[cfg(unix)]
 mod interrupt;
 mod prescriptions;
+mod rectangles;
 mod refusals;
 mod replacing;
 mod survey;

@@ -20,7 +20,7 @@ use crate::geometry::triangle::{angles, cotangents};
 use std::f64::consts::FRAC_PI_2;
 
 /// A crossing lies at least this part of an edge from its ends, so that no face becomes a sliver.
-const CLEARANCE: f64 = 0.05;
+const CLEARANCE: f64 = 0.15;
 /// Least weight of an edge, in units of the cotangent of π/4.
 const LEAST_WEIGHT: f64 = 1e-3;
 /// Largest weight, so that slivers do not spoil the condition.
