@@ -1,7 +1,8 @@
-//! Patches with many sides divided by lines from border to border, until each part has few.
+//! Patches divided by lines from border to border, until each part has few sides and no corner at the end of a corridor.
 //!
 //! *Enters:* a [`Drawing`] with its nodes. *Leaves:* more walls and nodes on it. *Guaranteed:* every part is a disk with at least
-//! three sides. *Not guaranteed:* at most [`MOST_SIDES`], since a neighbour may put a node on a side afterwards.
+//! three sides. *Not guaranteed:* at most [`MOST_SIDES`], since a neighbour may put a node on a side afterwards, nor that every
+//! corridor is cut: in parts of a few faces there is no room for lines.
 //!
 //! A centre that is joined to many middles has sharp angles, and a map that opens a sharp angle α to π/2 shrinks what is at a distance r
 //! from it like r^{π/2α}: at ten degrees, r⁹. So lines begin where there is room: at a node with an obtuse angle, or at the middle of a side,

@@ -4,10 +4,10 @@
 //! rectangles: each is sampled corner to corner, a full grid without a mask.
 //!
 //! ```text
-//! flat patches → sides, nodes, middles → quads → Ricci flow of each → rectangles glued → charts carried over
+//! flat patches → sides and nodes → division → middles → quads → Ricci flow of each → rectangles glued → charts carried over
 //! ```
 //!
-//! A patch with n sides becomes n quads ([`quads`]); each quad is flattened by the same flow that made the cone metric, with π/2 at
+//! Patches with many or hidden corners are divided first ([`division`]). What has n sides becomes n quads ([`quads`]); each quad is flattened by the same flow that made the cone metric, with π/2 at
 //! its four corners and nothing else ([`flow`]); its aspect ratio is its modulus, which cannot be chosen. The final triangulation
 //! of a quad is not that of the surface, so the surface is refined once more, and what is linear on its faces is carried over
 //! ([`lift`]).

@@ -6,9 +6,11 @@
 //! the same half of a patch's side or the same line to a centre. Quads are disks.
 //! *Not guaranteed:* the least number of quads.
 //!
-//! The centre is where the borders that the middles bound are seen as equally as can be: of the products of their harmonic measures it
-//! has the largest on a line through the best vertex. Lines start from it at equal angles: the border values next to it are
-//! chosen so.
+//! The centre is where the corners are seen as equally as can be: the product of the harmonic measures of the borders between
+//! middles is largest there, on a line through the best vertex. Lines leave it at equal angles ([`aim`]).
+
+// A ring of new vertices around the centre was tried, to tell directions apart in coarse parts: it keeps the shapes of the faces that
+// are there, so nothing is won, and its small faces are where the flow of a quad ran out of digits.
 
 use super::RectangleError;
 use super::chord::{Crossing, aim, harmonic, zero_level};

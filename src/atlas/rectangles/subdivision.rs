@@ -127,9 +127,9 @@ mod tests {
         for h in c.halfedges() {
             let parent = mesh.face_positions(fine.parent[c.face(h)]);
             let w = fine.corner[h].weights;
-            for i in 0..3 {
-                let there: f64 = (0..3).map(|k| w[k] * parent[k][i]).sum();
-                assert!((there - fine.position[c.tail(h)][i]).abs() < 1e-13);
+            for (i, &here) in fine.position[c.tail(h)].iter().enumerate() {
+                let there: f64 = w.iter().zip(&parent).map(|(w, p)| w * p[i]).sum();
+                assert!((there - here).abs() < 1e-13);
             }
             on_sides += usize::from(fine.side_of_parent(h).is_some());
             if c.twin(h).is_none() {
