@@ -7,13 +7,13 @@
 //! flat patches → sides and nodes → division → middles → quads → Ricci flow of each → rectangles glued → charts carried over
 //! ```
 //!
-//! Patches with many or hidden corners are divided first ([`division`]). What has n sides becomes n quads ([`quads`]); each quad is flattened by the same flow that made the cone metric, with π/2 at
-//! its four corners and nothing else ([`flow`]); its aspect ratio is its modulus, which cannot be chosen. The final triangulation
+//! Patches with many or hidden corners are divided first (`division`). What has n sides becomes n quads (`quads`); each quad is flattened by the same flow that made the cone metric, with π/2 at
+//! its four corners and nothing else (`flow`); its aspect ratio is its modulus, which cannot be chosen. The final triangulation
 //! of a quad is not that of the surface, so the surface is refined once more, and what is linear on its faces is carried over
-//! ([`lift`]).
+//! (`lift`).
 //!
 //! *Guaranteed:* patches are injective, since a developed flat disk with straight sides and right angles is a rectangle; every
-//! side of a rectangle is a whole side of its neighbour, corner to corner, with as many samples ([`counts`]); corners of images
+//! side of a rectangle is a whole side of its neighbour, corner to corner, with as many samples (`counts`); corners of images
 //! hold the same points to the last bit. *Not guaranteed:* that samples along a shared side are the same points: the two sides of a wall
 //! are stretched differently by their two conformal maps. The seam samples give both coordinates of every vertex between.
 //! The log scale inside a rectangle is not bounded either.
