@@ -9,7 +9,7 @@
 //! missing. The same for any number of threads.
 
 use crate::atlas::patches::raster::{cover, to_texel};
-use crate::atlas::patches::{Patch, PatchLayout};
+use crate::atlas::patches::{Domain, Patch, PatchLayout};
 use crate::geometry::ids::{FaceId, NONE, VertexVec};
 use crate::geometry::mesh::{
     AttributeKind, CornerAttribute, Mesh, bounding_box, cross, distance, norm, sub,
@@ -171,7 +171,7 @@ fn sample_patch(
         face: vec![NONE; count],
         log_scale: vec![0.0; count],
     };
-    let texels = |f: FaceId| layout.uv[f].map(|p| to_texel(&patch.texel_to_patch, p));
+    let texels = |f: FaceId| layout.uv[f].map(|p| in_texels(patch, p));
     for &f in faces {
         let corners = surface.corners(f);
         cover(texels(f), width, height, |column, row, weights| {
@@ -198,6 +198,20 @@ fn sample_patch(
     }
     image.dilate(&sources);
     image
+}
+
+/// A point of a patch in texels, such that texels are sampled at halves. The sides of a rectangle come to lie on the first and the
+/// last column and row to the last bit.
+fn in_texels(patch: &Patch, p: [f64; 2]) -> [f64; 2] {
+    match patch.domain() {
+        Domain::Flat => to_texel(&patch.texel_to_patch, p),
+        Domain::Rectangle => {
+            let height = patch.texel_to_patch[1][2];
+            let last = [patch.width, patch.height].map(|n| n.saturating_sub(1) as f64);
+            let down = (height - p[1]) / height;
+            [p[0] * last[0] + 0.5, down * last[1] + 0.5]
+        }
+    }
 }
 
 impl GeometryImage {

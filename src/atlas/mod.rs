@@ -6,3 +6,4 @@ pub mod geometry_image;
 pub mod overlay;
 pub mod patches;
 pub mod plane;
+pub mod rectangles;

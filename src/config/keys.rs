@@ -424,6 +424,12 @@ pub const KEYS: &[Key] = &[
         "texels",
         "2",
     ),
+    key(
+        "images.domain",
+        Kind::Choice(&["flat", "rectangle"]),
+        "",
+        "\"flat\"",
+    ),
     key("pictures.enabled", Kind::Bool, "", "true"),
     key(
         "pictures.size",

@@ -46,8 +46,10 @@ pub struct Config {
     pub connectivity: RefineParams,
     /// The Ricci flow (3.3, 3.4, 4.2).
     pub flow: FlowParams,
-    /// Patches and geometry images (5.5).
+    /// Patches (5.5).
     pub patches: PatchParams,
+    /// Geometry images (5.5).
+    pub images: ImageParams,
     /// Pictures of the result.
     pub pictures: PictureParams,
     /// How the program runs; never changes a result.

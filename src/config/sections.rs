@@ -1,7 +1,8 @@
 //! The sections of [`Config`](super::Config).
 //!
-//! Most are the stages' own parameters; `[input]`, `[output]`, `[pictures]` and `[run]` belong here.
+//! Most are the stages' own parameters; `[input]`, `[output]`, `[images]`, `[pictures]` and `[run]` belong here.
 
+use crate::atlas::patches::Domain;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -35,6 +36,14 @@ impl Default for OutputParams {
             folder: PathBuf::from("affine-atlas-out"),
         }
     }
+}
+
+/// `[images]`: geometry images.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ImageParams {
+    /// What an image is sampled over.
+    pub domain: Domain,
 }
 
 /// `[pictures]`: pictures of the result, drawn without a display.

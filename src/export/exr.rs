@@ -8,7 +8,8 @@
 //! there is exactly one, the JSON text `affineAtlas`, and the bytes are reproducible.
 
 use crate::atlas::geometry_image::GeometryImage;
-use crate::export::atlas_json::{Document, Domain, Similarity, Units};
+use crate::atlas::patches::Domain;
+use crate::export::atlas_json::{Document, Similarity, Units};
 use crate::export::{EncodeError, Provenance};
 use ::exr::image::write::WritableImage;
 use ::exr::meta::attribute::{AttributeValue, LineOrder, Text};

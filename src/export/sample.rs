@@ -467,11 +467,11 @@ impl Grid {
             face_patch: FaceVec::filled(PatchId::new(0), uv.len()),
             uv,
             patches: vec![Patch {
-                to_chart: Similarity {
+                to_chart: Some(Similarity {
                     scale: 1.0,
                     rotation: 0.0,
                     translation: [0.0, 0.0],
-                },
+                }),
                 width: size[0],
                 height: size[1],
                 texel_to_patch: self.texel_to_patch(),

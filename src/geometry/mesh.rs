@@ -82,7 +82,8 @@ impl CornerAttribute {
         self.values[at..at + self.components].copy_from_slice(value);
     }
 
-    fn mix(&self, face: usize, terms: &[(usize, f64)]) -> Vec<f32> {
+    /// The value between corners of a face, each with its weight; directions stay unit vectors.
+    pub fn mix(&self, face: usize, terms: &[(usize, f64)]) -> Vec<f32> {
         let mut sum: Vec<f64> = (0..self.components)
             .map(|c| {
                 let term = |&(k, w): &(usize, f64)| f64::from(self.corner(face, k)[c]) * w;

@@ -5,6 +5,7 @@ use crate::atlas::cut::CutError;
 use crate::atlas::develop::DevelopError;
 use crate::atlas::overlay::OverlayError;
 use crate::atlas::patches::PatchError;
+use crate::atlas::rectangles::RectangleError;
 use crate::export::ExportError;
 use crate::flow::cones::ConeError;
 use crate::flow::refine::{self, RefineError};
@@ -51,6 +52,9 @@ pub enum BuildError {
     /// The patches could not be made.
     #[error(transparent)]
     Patch(#[from] PatchError),
+    /// The patches could not be made rectangles.
+    #[error(transparent)]
+    Rectangle(#[from] RectangleError),
     /// Nothing could be written.
     #[error(transparent)]
     Export(ExportError),
@@ -88,6 +92,12 @@ impl BuildError {
             BuildError::Chart(ChartError::Develop(_)) => FailureKind::NotConverged,
             BuildError::Patch(PatchError::NotFinite { .. }) => FailureKind::NotConverged,
             BuildError::Patch(_) => FailureKind::Prescription,
+            BuildError::Rectangle(
+                RectangleError::Flow { .. }
+                | RectangleError::NotStraight { .. }
+                | RectangleError::Develop(_),
+            ) => FailureKind::NotConverged,
+            BuildError::Rectangle(_) => FailureKind::Internal,
             BuildError::Export(error) if error.is_internal() => FailureKind::Internal,
             BuildError::Export(_) => FailureKind::Output,
             BuildError::Cancelled => FailureKind::Internal,

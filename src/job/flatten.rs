@@ -56,6 +56,7 @@ pub(super) fn flatten(
         prescription,
         layout,
         unmatched,
+        ..
     } = overlay::overlay(mesh, metric, prescription)?;
     if unmatched > 0 {
         tracing::warn!(unmatched, "crossings were placed between their neighbours");

@@ -17,7 +17,9 @@ pub use inspect::{Inspection, inspect};
 use flatten::{Flattened, flatten, refine_for};
 
 use crate::atlas::develop::Development;
-use crate::atlas::{charts, develop, geometry_image, patches};
+use crate::atlas::patches::Domain;
+use crate::atlas::rectangles::Charted;
+use crate::atlas::{charts, develop, geometry_image, patches, rectangles};
 use crate::config::Config;
 use crate::export::folder::{Staging, component_name, list_files};
 use crate::export::{self, ExportError, Provenance, pictures};
@@ -113,6 +115,30 @@ fn build_component(
         under,
         &config.patches,
     )?;
+    let surface = Charted {
+        mesh,
+        metric,
+        prescription,
+        cut,
+        central,
+        charts,
+    };
+    let (surface, patches) = match config.images.domain {
+        Domain::Flat => (surface, patches),
+        Domain::Rectangle => {
+            enter("rectangles")?;
+            let tolerance = config.flow.curvature_tolerance;
+            rectangles::rectangles(surface, &patches, &config.patches, tolerance)?
+        }
+    };
+    let Charted {
+        mesh,
+        metric,
+        prescription,
+        cut,
+        central,
+        charts,
+    } = surface;
     enter("images")?;
     let image_origin = geometry_image::image_origin(&mesh);
     let images = geometry_image::sample(&mesh, &patches, &metric.log_scale, image_origin);

@@ -10,6 +10,7 @@ mod good;
 mod interrupt;
 mod prescriptions;
 mod rebuild;
+mod rectangles;
 mod refusals;
 mod replacing;
 mod survey;

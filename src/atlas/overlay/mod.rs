@@ -25,13 +25,14 @@ mod slice;
 mod tests;
 
 pub use layout::{Carrier, Layout};
+pub use regions::OnBase;
 
 use crate::flow::cones::Prescription;
 use crate::flow::correspondence::{CorrespondenceError, Curves};
 use crate::flow::intrinsic::Intrinsic;
 use crate::flow::ricci::FlatMetric;
 use crate::geometry::connectivity::{Connectivity, ConnectivityError};
-use crate::geometry::ids::{EdgeId, EdgeVec, HalfedgeId, NONE, VertexVec};
+use crate::geometry::ids::{EdgeId, EdgeVec, HalfedgeId, HalfedgeVec, NONE, VertexVec};
 use crate::geometry::mesh::Mesh;
 use crossings::Crossings;
 use layout::Refinement;
@@ -51,6 +52,9 @@ pub struct Overlay {
     pub prescription: Prescription,
     /// What is cut and developed.
     pub layout: Layout,
+    /// Where the corner that every halfedge leaves lies on the face of the base mesh that its face lies in; `None` where nothing was
+    /// added and the faces are those of the base mesh.
+    pub on_base: Option<HalfedgeVec<OnBase>>,
     /// Crossings whose places were guessed from their neighbours'; see [`Positions`].
     pub unmatched: usize,
 }
@@ -110,6 +114,7 @@ pub fn overlay(
             metric,
             prescription,
             layout,
+            on_base: None,
             unmatched: 0,
         });
     };
@@ -239,6 +244,7 @@ fn refine(
             ..prescription
         },
         layout,
+        on_base: Some(corners.into()),
         unmatched: places.unmatched,
     })
 }
@@ -266,6 +272,7 @@ fn unrefined(
         mesh,
         metric,
         prescription,
+        on_base: None,
         unmatched: 0,
     })
 }

@@ -17,7 +17,7 @@ use crate::geometry::mesh::distance;
 
 /// Where a corner of the overlay lies on its base face.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct OnBase {
+pub struct OnBase {
     /// Side, from the base corner where it begins.
     pub side: u8,
     /// Fraction along it; 0 at the corner.

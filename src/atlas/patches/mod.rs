@@ -37,6 +37,7 @@ use crate::atlas::overlay::Layout;
 use crate::atlas::plane::Similarity;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, PatchId};
 use crate::geometry::mesh::Mesh;
+pub(crate) use seams::seams;
 use slit::Slit;
 #[cfg(test)]
 pub(crate) use slit::own_development_error;
@@ -47,19 +48,40 @@ pub const MAX_SIDE: usize = 8192;
 /// The domain of one geometry image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Patch {
-    /// Patch coordinates to central-chart coordinates.
-    pub to_chart: Similarity,
+    /// Patch coordinates to central-chart coordinates; none for a rectangle, which is no similar picture of it.
+    pub to_chart: Option<Similarity>,
     /// Columns of the image.
     pub width: usize,
     /// Rows of the image.
     pub height: usize,
-    /// (column, row, 1) of a texel's centre, row 0 at the top and the centre of texel (0, 0) at (0.5, 0.5),
-    /// to patch coordinates.
+    /// (column, row, 1), row 0 at the top, to patch coordinates. The centre of texel (0, 0) is (0.5, 0.5), and there a flat
+    /// patch is sampled; a rectangle is sampled at whole numbers, from (0, 0) at its upper left corner on.
     pub texel_to_patch: [[f64; 3]; 2],
     /// Where the patch lies in the packed unit square: `packed = uv * scale + offset`, v up.
     pub packed_scale: f64,
     /// See `packed_scale`.
     pub packed_offset: [f64; 2],
+}
+
+impl Patch {
+    /// How texels lie in it.
+    pub fn domain(&self) -> Domain {
+        match self.to_chart {
+            Some(_) => Domain::Flat,
+            None => Domain::Rectangle,
+        }
+    }
+}
+
+/// What geometry images are sampled over.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Domain {
+    /// A similarity of the central chart, sampled at texel centres, with a mask.
+    #[default]
+    Flat,
+    /// A rectangle, sampled at grid corners from border to border: a full grid.
+    Rectangle,
 }
 
 /// A maximal chain along which two patches meet, or a patch meets itself or the surface's boundary.
@@ -227,30 +249,43 @@ pub fn layout(
             [raster.width, (rows + 2.0 * raster.margin).round() as usize]
         })
         .collect();
-    let (corners, side) = packing::pack(&sizes);
-    let side = side as f64;
+    let contents: Vec<[f64; 2]> = oriented
+        .iter()
+        .zip(&rasters)
+        .map(|(patch, raster)| [raster.density, raster.density * patch.height])
+        .collect();
     let patches = oriented
         .iter()
         .zip(&rasters)
-        .zip(sizes.iter().zip(&corners))
-        .map(|((patch, raster), (size, corner))| {
-            let content = [raster.density, raster.density * patch.height];
-            let place = |i: usize| corner[i] as f64 + 0.5 * (size[i] as f64 - content[i]);
-            Patch {
-                to_chart: patch.to_chart,
-                width: raster.width,
-                height: raster.height,
-                texel_to_patch: raster.texel_to_patch,
-                packed_scale: raster.density / side,
-                packed_offset: [place(0) / side, place(1) / side],
-            }
+        .zip(packed(&sizes, &contents))
+        .map(|((patch, raster), (packed_scale, packed_offset))| Patch {
+            to_chart: Some(patch.to_chart),
+            width: raster.width,
+            height: raster.height,
+            texel_to_patch: raster.texel_to_patch,
+            packed_scale,
+            packed_offset,
         })
         .collect();
-    let seams = seams::seams(&slit, &face_patch, &uv);
+    let seams = seams(mesh, &cut.is_cut, &face_patch, &uv);
     Ok(PatchLayout {
         face_patch,
         uv,
         patches,
         seams,
     })
+}
+
+/// Places contents (width, height) in the middle of their boxes, packed into a square: the part of the square that a unit of the
+/// content's width is, and where its lower left corner lies in the unit square.
+pub(crate) fn packed(sizes: &[[usize; 2]], contents: &[[f64; 2]]) -> Vec<(f64, [f64; 2])> {
+    let (corners, side) = packing::pack(sizes);
+    let side = side as f64;
+    let boxes = sizes.iter().zip(&corners).zip(contents);
+    boxes
+        .map(|((size, corner), content)| {
+            let place = |i: usize| corner[i] as f64 + 0.5 * (size[i] as f64 - content[i]);
+            (content[0] / side, [place(0) / side, place(1) / side])
+        })
+        .collect()
 }

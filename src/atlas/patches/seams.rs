@@ -1,17 +1,19 @@
 //! Seams: where patches meet each other, themselves across the cut, or the surface's boundary.
 
-use super::slit::Slit;
 use super::{Seam, SeamSample};
+use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceVec, HalfedgeId, PatchId, VertexVec};
+use crate::geometry::mesh::Mesh;
 
 /// All seams, in the order of their first halfedge; open ones first. The lower patch is on the left,
 /// and of a boundary the surface.
-pub(super) fn seams(
-    slit: &Slit,
+pub(crate) fn seams(
+    mesh: &Mesh,
+    is_cut: &EdgeVec<bool>,
     face_patch: &FaceVec<PatchId>,
     uv: &FaceVec<[[f64; 2]; 3]>,
 ) -> Vec<Seam> {
-    let c = slit.connectivity;
+    let c = &mesh.connectivity;
     let pair = |h: HalfedgeId| {
         let right = c.twin(h).map(|t| face_patch[c.face(t)]);
         (face_patch[c.face(h)], right)
@@ -20,7 +22,7 @@ pub(super) fn seams(
         .edges()
         .map(|e| {
             let (left, right) = pair(c.edge_halfedge(e));
-            slit.cut.is_cut[e] || right != Some(left)
+            is_cut[e] || right != Some(left)
         })
         .collect();
     let mut valence = VertexVec::filled(0u32, c.vertex_count());
@@ -48,7 +50,7 @@ pub(super) fn seams(
     let mut seams = Vec::new();
     for closed in [false, true] {
         for start in c.halfedges().filter(forward) {
-            let begins = closed || previous_of(slit, start, &is_seam, &valence, &pair).is_none();
+            let begins = closed || previous_of(c, start, &is_seam, &valence, &pair).is_none();
             if used[c.edge(start)] || !begins {
                 continue;
             }
@@ -60,7 +62,7 @@ pub(super) fn seams(
                 at = next(h);
             }
             let (left, right) = pair(start);
-            let samples = samples(slit, &chain, uv);
+            let samples = samples(mesh, &chain, uv);
             seams.push(Seam {
                 left,
                 right,
@@ -73,13 +75,12 @@ pub(super) fn seams(
 
 /// The halfedge before one in its chain: the chain of the other direction, turned.
 fn previous_of(
-    slit: &Slit,
+    c: &Connectivity,
     h: HalfedgeId,
     is_seam: &EdgeVec<bool>,
     valence: &VertexVec<u32>,
     pair: &impl Fn(HalfedgeId) -> (PatchId, Option<PatchId>),
 ) -> Option<HalfedgeId> {
-    let c = slit.connectivity;
     if valence[c.tail(h)] != 2 {
         return None;
     }
@@ -90,8 +91,8 @@ fn previous_of(
     (pair(p) == pair(h)).then_some(p)
 }
 
-fn samples(slit: &Slit, chain: &[HalfedgeId], uv: &FaceVec<[[f64; 2]; 3]>) -> Vec<SeamSample> {
-    let c = slit.connectivity;
+fn samples(mesh: &Mesh, chain: &[HalfedgeId], uv: &FaceVec<[[f64; 2]; 3]>) -> Vec<SeamSample> {
+    let c = &mesh.connectivity;
     let sample = |h: HalfedgeId, at_head: bool| {
         let corner = |h: HalfedgeId| uv[c.face(h)][c.corner(h)];
         let (vertex, left) = if at_head {
@@ -103,7 +104,7 @@ fn samples(slit: &Slit, chain: &[HalfedgeId], uv: &FaceVec<[[f64; 2]; 3]>) -> Ve
             .twin(h)
             .map(|t| corner(if at_head { t } else { c.next(t) }));
         SeamSample {
-            position: slit.mesh.positions[vertex],
+            position: mesh.positions[vertex],
             left,
             right: right.unwrap_or([f64::NAN; 2]),
         }

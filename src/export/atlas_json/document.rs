@@ -1,5 +1,6 @@
 //! The document key by key, in the order in which it is written.
 
+use crate::atlas::patches::Domain;
 use crate::flow::ricci::{FlowStep, PackingFit, Scheme, Solver};
 use crate::product::{ConnectivityRepair, Quality};
 use serde::{Deserialize, Serialize};
@@ -238,16 +239,6 @@ pub struct Transition {
     pub motion: Motion,
     /// Number of faces in the overlap.
     pub faces: usize,
-}
-
-/// How image texels lie in a patch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Domain {
-    /// A similarity of the central chart, sampled at texel centres.
-    Flat,
-    /// A rectangle, sampled at grid corners.
-    Rectangle,
 }
 
 /// The domain of one geometry image.

@@ -204,14 +204,14 @@ fn patches(atlas: &AffineAtlas) -> Vec<Patch> {
         .map(|(id, patch)| Patch {
             id,
             image: image_path(id),
-            domain: Domain::Flat,
+            domain: patch.domain(),
             width: patch.width,
             height: patch.height,
             texel_to_patch: patch.texel_to_patch,
-            patch_to_chart: Some(Similarity {
-                scale: patch.to_chart.scale,
-                rotation: wrap_angle(patch.to_chart.rotation),
-                translation: patch.to_chart.translation,
+            patch_to_chart: patch.to_chart.map(|map| Similarity {
+                scale: map.scale,
+                rotation: wrap_angle(map.rotation),
+                translation: map.translation,
             }),
             patch_to_packed: Packing {
                 scale: patch.packed_scale,

@@ -14,6 +14,7 @@ pub mod rebuilt;
 pub mod region;
 mod vertices;
 
+use crate::atlas::patches::Domain;
 use crate::export::atlas_json::{self, Document, Patch};
 use crate::export::{ExportError, Provenance};
 use crate::geometry::ids::{FaceId, NONE};
@@ -135,13 +136,18 @@ fn extras(document: &Document) -> Box<RawValue> {
 fn rectangle(patch: &Patch) -> [f64; 4] {
     let m = patch.texel_to_patch;
     let packing = patch.patch_to_packed;
-    let packed = |column: usize, row: usize| -> [f64; 2] {
-        let p = m.map(|r| r[0] * column as f64 + r[1] * row as f64 + r[2]);
+    let packed = |column: f64, row: f64| -> [f64; 2] {
+        let p = m.map(|r| r[0] * column + r[1] * row + r[2]);
         let [u, v] = [0, 1].map(|i| packing.scale * p[i] + packing.translation[i]);
         [u, 1.0 - v]
     };
-    let [left, top] = packed(0, 0);
-    let [right, bottom] = packed(patch.width, patch.height);
+    // A texel reaches half its size from where it is sampled.
+    let first = match patch.domain {
+        Domain::Flat => 0.0,
+        Domain::Rectangle => -0.5,
+    };
+    let [left, top] = packed(first, first);
+    let [right, bottom] = packed(first + patch.width as f64, first + patch.height as f64);
     [left, top, right, bottom]
 }
 

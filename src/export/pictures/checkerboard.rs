@@ -88,7 +88,8 @@ impl Checkerboard<'_> {
     fn place(&self, f: FaceId, weights: [f64; 3], cell: f64) -> [f64; 2] {
         let layout = &self.atlas.patches;
         let patch = layout.patches.get(layout.face_patch[f].index());
-        let uv = match patch {
+        let motion = patch.and_then(|patch| patch.to_chart);
+        let uv = match motion {
             Some(_) => &layout.uv[f],
             None => &self.atlas.central.uv[f],
         };
@@ -96,8 +97,7 @@ impl Checkerboard<'_> {
             let d = |k: usize| uv[k][i] - uv[0][i];
             uv[0][i] + weights[1] * d(1) + weights[2] * d(2)
         });
-        let Some(patch) = patch else { return at };
-        let motion = patch.to_chart;
+        let Some(motion) = motion else { return at };
         let turned = rotate(at, motion.rotation);
         std::array::from_fn(|i| motion.scale * turned[i] + motion.translation[i] % (2.0 * cell))
     }

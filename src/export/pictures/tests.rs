@@ -94,11 +94,11 @@ fn torus(n: u32, m: u32, k: f64) -> AffineAtlas {
     let extent = (high[0] - low[0]).max(high[1] - low[1]);
     let half = |f: usize| f / (face_count / 2).max(1);
     let patch = |p: usize| Patch {
-        to_chart: Similarity {
+        to_chart: Some(Similarity {
             scale: 1.0,
             rotation: 0.0,
             translation: [0.0; 2],
-        },
+        }),
         width: 64,
         height: 64,
         texel_to_patch: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],

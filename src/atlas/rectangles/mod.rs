@@ -1,0 +1,234 @@
+//! Rectangles: four-sided patches that the flow itself maps to rectangles, in place of flat ones (`images.domain = "rectangle"`).
+//!
+//! *Enters:* a surface with its charts, and its flat patches. *Leaves:* the same surface on finer faces, and a [`PatchLayout`] of
+//! rectangles: each is sampled corner to corner, a full grid without a mask.
+//!
+//! ```text
+//! flat patches → sides and nodes → division → middles → quads → Ricci flow of each → rectangles glued → charts carried over
+//! ```
+//!
+//! Patches with many or hidden corners are divided first (`division`). What has n sides becomes n quads (`quads`); each quad is flattened by the same flow that made the cone metric, with π/2 at
+//! its four corners and nothing else (`flow`); its aspect ratio is its modulus, which cannot be chosen. The final triangulation
+//! of a quad is not that of the surface, so the surface is refined once more, and what is linear on its faces is carried over
+//! (`lift`).
+//!
+//! *Guaranteed:* patches are injective, since a developed flat disk with straight sides and right angles is a rectangle; every
+//! side of a rectangle is a whole side of its neighbour, corner to corner, with as many samples (`counts`); corners of images
+//! hold the same points to the last bit. *Not guaranteed:* that samples along a shared side are the same points: the two sides of a wall
+//! are stretched differently by their two conformal maps. The seam samples give both coordinates of every vertex between.
+//! The log scale inside a rectangle is not bounded either.
+//!
+//! The tutorial shows rectangles for disks only (Fig. 10 and 18, four corners of π/2); quads by joining centres to middles are
+//! E. Catmull, J. Clark, *Recursively generated B-spline surfaces on arbitrary topological meshes* (1978).
+
+mod chord;
+mod counts;
+mod disk;
+mod division;
+mod flow;
+mod glue;
+mod lift;
+mod quads;
+mod sides;
+mod subdivision;
+
+use crate::atlas::charts::Charts;
+use crate::atlas::cut::{CutError, CutGraph};
+use crate::atlas::develop::{DevelopError, Development};
+use crate::atlas::overlay::OverlayError;
+use crate::atlas::patches::{Patch, PatchLayout, PatchParams, packed, seams};
+use crate::flow::cones::Prescription;
+use crate::flow::ricci::{FlatMetric, FlowError};
+use crate::flow::solve::SolveError;
+use crate::geometry::connectivity::ConnectivityError;
+use crate::geometry::ids::{FaceVec, PatchId};
+use crate::geometry::mesh::Mesh;
+use flow::Rectangle;
+use quads::Quad;
+use rayon::prelude::*;
+use sides::Drawing;
+
+/// A surface with its flat metric, slit, developed and covered by charts.
+#[derive(Clone, Debug)]
+pub struct Charted {
+    /// The surface.
+    pub mesh: Mesh,
+    /// Flat metric on its edges.
+    pub metric: FlatMetric,
+    /// Target curvature of its vertices.
+    pub prescription: Prescription,
+    /// The cut on it.
+    pub cut: CutGraph,
+    /// The central chart.
+    pub central: Development,
+    /// All others.
+    pub charts: Charts,
+}
+
+/// Why there are no rectangles.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RectangleError {
+    /// A patch, or a part of one, is no disk.
+    #[error(
+        "patch {patch} has Euler characteristic {euler_characteristic} and {border_loops} borders, but a disk has 1 and 1: please report this mesh"
+    )]
+    NotADisk {
+        /// The flat patch.
+        patch: usize,
+        /// χ of it.
+        euler_characteristic: i64,
+        /// Its borders.
+        border_loops: usize,
+    },
+    /// Something that holds for every mesh does not.
+    #[error(
+        "{what} do not fit together: please report this mesh, and use images.domain = \"flat\" meanwhile"
+    )]
+    Inconsistent {
+        /// What was looked at.
+        what: &'static str,
+    },
+    /// The flow of a quad found no metric.
+    #[error(
+        "rectangle {quad} could not be flattened; use images.domain = \"flat\", or more cones, which make patches simpler: {error}"
+    )]
+    Flow {
+        /// Number of the quad.
+        quad: usize,
+        /// What the flow said.
+        error: FlowError,
+    },
+    /// The sides of a developed quad are not straight.
+    #[error(
+        "rectangle {quad} has a border vertex {bend:e} diagonals from its side, more than {bound:e}; use images.domain = \"flat\", or more cones, which make patches simpler"
+    )]
+    NotStraight {
+        /// Number of the quad.
+        quad: usize,
+        /// Largest distance of a border vertex from its side, in diagonals.
+        bend: f64,
+        /// What is allowed.
+        bound: f64,
+    },
+    /// A system of equations could not be solved.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// A quad could not be refined.
+    #[error(transparent)]
+    Overlay(#[from] OverlayError),
+    /// A quad is no disk.
+    #[error(transparent)]
+    Cut(#[from] CutError),
+    /// A quad could not be developed.
+    #[error(transparent)]
+    Develop(#[from] DevelopError),
+    /// The pieces do not make a surface.
+    #[error(transparent)]
+    Connectivity(#[from] ConnectivityError),
+}
+
+/// Replaces flat patches by rectangles; the surface and everything on it gets finer faces.
+///
+/// `curvature_tolerance` is that of the flow.
+///
+/// # Errors
+/// A quad whose flow does not arrive in float64. Everything else is not expected.
+pub fn rectangles(
+    surface: Charted,
+    flat: &PatchLayout,
+    params: &PatchParams,
+    curvature_tolerance: f64,
+) -> Result<(Charted, PatchLayout), RectangleError> {
+    let mut drawing = Drawing::new(&surface.mesh, &surface.cut.is_cut, &flat.face_patch)?;
+    division::divide(&mut drawing)?;
+    drawing.mark_middles();
+    let quads = quads::quads(&mut drawing)?;
+    let samples = counts::samples(&drawing.fine, &quads, params.texel_budget);
+    let flattened: Vec<Rectangle> = quads
+        .par_iter()
+        .enumerate()
+        .map(|(i, quad)| flow::flatten(&drawing.fine, quad, i, curvature_tolerance))
+        .collect::<Result<_, _>>()?;
+    let least =
+        |value: fn(&Rectangle) -> f64| flattened.iter().map(value).fold(f64::INFINITY, f64::min);
+    tracing::debug!(
+        rectangles = flattened.len(),
+        least_height = least(|r| r.height),
+        greatest_bend = -least(|r| -r.bend),
+        "patches became rectangles"
+    );
+    let patches = patches(&flattened, &samples, params);
+    let (fine, face_patch) = glue::glue(&drawing.fine, flattened)?;
+    let surface = lift::lift(surface, &fine);
+    let c = &fine.connectivity;
+    let uv: FaceVec<[[f64; 2]; 3]> = c
+        .faces()
+        .map(|f| c.face_halfedges(f).map(|h| fine.corner[h].uv))
+        .collect();
+    let face_patch: FaceVec<PatchId> = face_patch.into();
+    let seams = seams(&surface.mesh, &surface.cut.is_cut, &face_patch, &uv);
+    let layout = PatchLayout {
+        face_patch,
+        uv,
+        patches,
+        seams,
+    };
+    Ok((surface, layout))
+}
+
+/// The images: from corner to corner of the rectangles, as many samples as their sides have.
+fn patches(rectangles: &[Rectangle], samples: &[[usize; 2]], params: &PatchParams) -> Vec<Patch> {
+    let images: Vec<([usize; 2], f64)> = rectangles
+        .iter()
+        .zip(samples)
+        .map(|(r, n)| ([n[r.origin % 2], n[(r.origin + 1) % 2]], r.height))
+        .collect();
+    // In the packed square texels are square; as many as the image has.
+    let contents: Vec<[f64; 2]> = images
+        .iter()
+        .map(|&([columns, rows], height)| {
+            let texels = ((columns - 1) * (rows - 1)) as f64;
+            let density = (texels / height).sqrt().min(4.0 * columns as f64);
+            [density, density * height]
+        })
+        .collect();
+    let sizes: Vec<[usize; 2]> = contents
+        .iter()
+        .map(|content| content.map(|x| x.ceil() as usize + 2 * params.padding.max(1)))
+        .collect();
+    let places = packed(&sizes, &contents);
+    images
+        .iter()
+        .zip(places)
+        .map(
+            |(&([width, height], top), (packed_scale, packed_offset))| Patch {
+                to_chart: None,
+                width,
+                height,
+                texel_to_patch: [
+                    [1.0 / (width - 1) as f64, 0.0, 0.0],
+                    [0.0, -top / (height - 1) as f64, top],
+                ],
+                packed_scale,
+                packed_offset,
+            },
+        )
+        .collect()
+}
+
+impl Quad {
+    /// The edges of the drawing on a side, from corner `k` on.
+    fn side(
+        &self,
+        drawing: &subdivision::Subdivision,
+        k: usize,
+    ) -> Vec<crate::geometry::ids::EdgeId> {
+        let n = self.disk.border.len();
+        let (from, to) = (self.corners[k % 4], self.corners[(k + 1) % 4]);
+        let count = (to + n - from) % n;
+        let place = |i| self.disk.border[(from + i) % n];
+        (0..count)
+            .map(|i| self.disk.edge(drawing, place(i)))
+            .collect()
+    }
+}

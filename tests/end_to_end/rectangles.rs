@@ -1,0 +1,164 @@
+//! Rectangles: full grids whose sides fit, on every good fixture; checked from the files alone.
+
+use crate::arrays::array;
+use crate::command::{build, build_into, document, verify};
+use crate::good::files;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+const RECTANGLE: &str = "images.domain=rectangle";
+
+/// A side of a rectangle: its vertices in the direction of the border, and how many texels lie on it.
+struct Side {
+    patch: usize,
+    edges: BTreeSet<[u32; 2]>,
+    samples: u64,
+}
+
+/// The four sides of every patch, in which every border edge must lie exactly.
+fn sides(atlas: &Path) -> Vec<Side> {
+    let described = document(atlas);
+    let faces: Vec<u32> = array(atlas, "faces");
+    let uv: Vec<f64> = array(atlas, "patch_uv");
+    let patch: Vec<u32> = array(atlas, "patch");
+    let cut: Vec<u8> = array(atlas, "cut");
+    let halfedge = |h: usize| {
+        let (f, k) = (h / 3, h % 3);
+        [3 * f + (k + 1) % 3, 3 * f + (k + 2) % 3]
+    };
+    let mut by_ends: BTreeMap<[u32; 2], usize> = BTreeMap::new();
+    for h in 0..faces.len() {
+        by_ends.insert(halfedge(h).map(|corner| faces[corner]), h);
+    }
+    let patches = described["patches"].as_array().expect("a list");
+    let mut sides: Vec<Side> = Vec::new();
+    for (i, p) in patches.iter().enumerate() {
+        assert_eq!(p["domain"], "rectangle");
+        assert!(p["patch_to_chart"].is_null());
+        let [width, height] = ["width", "height"].map(|k| p[k].as_u64().expect("a count"));
+        assert!(width >= 8 && height >= 8);
+        for samples in [width, height, width, height] {
+            sides.push(Side {
+                patch: i,
+                edges: BTreeSet::new(),
+                samples,
+            });
+        }
+    }
+    for h in 0..faces.len() {
+        let [a, b] = halfedge(h).map(|corner| faces[corner]);
+        let p = patch[h / 3] as usize;
+        let across = by_ends.get(&[b, a]);
+        let is_inner = across.is_some_and(|&t| patch[t / 3] as usize == p && cut[h] == 0);
+        if is_inner {
+            continue;
+        }
+        let top = patches[p]["texel_to_patch"][1][2]
+            .as_f64()
+            .expect("a number");
+        let ends = halfedge(h).map(|corner| [uv[2 * corner], uv[2 * corner + 1]]);
+        let on = |i: usize, value: f64| ends.iter().all(|e| e[i] == value);
+        let lies = [on(1, 0.0), on(0, 1.0), on(1, top), on(0, 0.0)];
+        let side: Vec<usize> = (0..4).filter(|&k| lies[k]).collect();
+        let &[side] = &side[..] else {
+            panic!("border edge {a} {b} of patch {p} lies on sides {side:?}");
+        };
+        sides[4 * p + side].edges.insert([a.min(b), a.max(b)]);
+    }
+    sides
+}
+
+/// Every edge of a side is on one other side or on the surface's border, and the other side has no edge that this one lacks.
+fn assert_conforming(sides: &[Side], loops: u64) {
+    let mut of_edge: BTreeMap<[u32; 2], Vec<usize>> = BTreeMap::new();
+    for (i, side) in sides.iter().enumerate() {
+        assert!(
+            !side.edges.is_empty(),
+            "a side of {} is missing",
+            side.patch
+        );
+        for &edge in &side.edges {
+            of_edge.entry(edge).or_default().push(i);
+        }
+    }
+    let mut on_border = 0;
+    for (i, side) in sides.iter().enumerate() {
+        let across: BTreeSet<Option<usize>> = side
+            .edges
+            .iter()
+            .map(|edge| of_edge[edge].iter().copied().find(|&j| j != i))
+            .collect();
+        let across: Vec<Option<usize>> = across.into_iter().collect();
+        match across[..] {
+            [None] => on_border += 1,
+            [Some(j)] => {
+                assert_eq!(side.edges, sides[j].edges, "{i} {j}");
+                assert_eq!(side.samples, sides[j].samples, "{i} {j}");
+            }
+            _ => panic!("side {i} of patch {} meets {across:?}", side.patch),
+        }
+    }
+    assert_eq!(on_border > 0, loops > 0);
+}
+
+fn rectangles(fixture: &str) {
+    let mesh = format!("fixtures/good/{fixture}");
+    let built = build(Path::new(&mesh), &[RECTANGLE]);
+    let atlas = built.atlas();
+    verify(&atlas);
+    let loops = document(&atlas)["topology"]["boundary_loops"].as_u64();
+    assert_conforming(&sides(&atlas), loops.expect("a count"));
+}
+
+#[test]
+fn genus_0_animal() {
+    rectangles("genus-0-animal.ply");
+}
+
+#[test]
+fn genus_0_cube() {
+    rectangles("genus-0-cube.obj");
+}
+
+#[test]
+fn genus_1_mug() {
+    rectangles("genus-1-mug.off");
+}
+
+#[test]
+fn genus_2_amphora() {
+    rectangles("genus-2-amphora.glb");
+}
+
+#[test]
+fn genus_3_pretzel() {
+    rectangles("genus-3-pretzel.obj");
+}
+
+#[test]
+fn disk_mask() {
+    rectangles("disk-mask.obj");
+}
+
+#[test]
+fn three_boundaries_rabbit() {
+    rectangles("three-boundaries-rabbit.ply");
+}
+
+/// Quads are flattened side by side; nothing depends on which comes first.
+#[test]
+fn the_same_bytes_for_any_number_of_threads() {
+    let run = |threads: &str| {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let mesh = Path::new("fixtures/good/genus-2-amphora.glb");
+        let output = build_into(folder.path(), mesh, &[RECTANGLE, threads]);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{said}");
+        files(&folder.path().join("genus-2-amphora"))
+    };
+    let (one, two) = (run("run.threads=1"), run("run.threads=2"));
+    assert!(one.keys().eq(two.keys()));
+    for (file, bytes) in &one {
+        assert!(bytes == &two[file], "{file} depends on the threads");
+    }
+}
