@@ -55,9 +55,9 @@ pub enum FolderError {
         /// What it says.
         version: u64,
     },
-    /// A domain that cannot be rebuilt.
+    /// A domain that is not known.
     #[error(
-        "patch {patch} of {} has the domain {domain:?}; a mesh can be rebuilt from \"flat\" images only",
+        "patch {patch} of {} has the domain {domain:?}; it must be \"flat\" or \"rectangle\"",
         path.display()
     )]
     Domain {
@@ -135,6 +135,8 @@ pub struct StoredImage {
     pub height: usize,
     /// (column, row, 1) to patch coordinates.
     pub texel_to_patch: [[f64; 3]; 2],
+    /// True where texels are grid corners of a rectangle, false where they are texel centres of a `flat` patch.
+    pub is_rectangle: bool,
     /// Surface points minus the image origin, row by row from the top.
     pub position: Vec<[f32; 3]>,
     /// 1 where the texel lies in the patch.
@@ -175,6 +177,9 @@ struct Head {
     #[serde(default)]
     version: u64,
 }
+
+/// Names of the domains.
+const DOMAINS: [&str; 2] = ["flat", "rectangle"];
 
 #[derive(Deserialize)]
 struct Patch {
@@ -288,7 +293,7 @@ fn document(path: &Path) -> Result<Document, FolderError> {
                 image: patch.image.clone(),
             });
         }
-        if patch.domain != "flat" {
+        if !DOMAINS.contains(&patch.domain.as_str()) {
             return Err(FolderError::Domain {
                 path: path.to_owned(),
                 patch: row,
@@ -315,6 +320,7 @@ fn image(folder: &Path, patch: &Patch) -> Result<StoredImage, FolderError> {
                 width: patch.width,
                 height: patch.height,
                 texel_to_patch: patch.texel_to_patch,
+                is_rectangle: patch.domain == DOMAINS[1],
                 position: r
                     .into_iter()
                     .zip(g)

@@ -41,14 +41,14 @@ use crate::geometry::connectivity::Topology;
 use frame::Frame;
 use rayon::prelude::*;
 
-/// One geometry image in the `flat` domain.
+/// One geometry image.
 #[derive(Clone, Copy, Debug)]
 pub struct PatchImage<'a> {
     /// Columns.
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// (column, row, 1) to patch coordinates; see [`crate::atlas::patches::Patch::texel_to_patch`].
+    /// (column + ½, row + ½, 1) to patch coordinates, in either domain; see [`crate::atlas::patches::Domain::to_centres`].
     pub texel_to_patch: [[f64; 3]; 2],
     /// Surface points, row by row, row 0 at the top.
     pub position: &'a [[f32; 3]],
@@ -76,7 +76,7 @@ impl<'a> Images<'a> {
                 .map(|(patch, image)| PatchImage {
                     width: image.width,
                     height: image.height,
-                    texel_to_patch: patch.texel_to_patch,
+                    texel_to_patch: patch.domain().to_centres(patch.texel_to_patch),
                     position: &image.position,
                     alpha: &image.alpha,
                 })

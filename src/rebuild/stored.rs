@@ -1,7 +1,7 @@
 //! The images and seams of a folder, as rebuilding takes them.
 
 use super::{Images, PatchImage, RebuildError, Rebuilt};
-use crate::atlas::patches::{Seam, SeamSample};
+use crate::atlas::patches::{Domain, Seam, SeamSample};
 use crate::geometry::ids::PatchId;
 use crate::read::atlas::{BOUNDARY, ImageFolder, StatedTopology};
 
@@ -50,7 +50,10 @@ pub fn rebuild_stored(folder: &ImageFolder) -> Result<Rebuilt, RebuildError> {
             .map(|image| PatchImage {
                 width: image.width,
                 height: image.height,
-                texel_to_patch: image.texel_to_patch,
+                texel_to_patch: match image.is_rectangle {
+                    true => Domain::Rectangle.to_centres(image.texel_to_patch),
+                    false => image.texel_to_patch,
+                },
                 position: &image.position,
                 alpha: &image.alpha,
             })

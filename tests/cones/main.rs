@@ -87,13 +87,6 @@ fn main() {
             let name = format!("invariance/{objective:?}/{model}");
             trials.push(trial(name, corpus.clone(), case));
         }
-        for (model, condition) in STABLE {
-            let case = move |corpus: &Path| {
-                stability::subdivision(&corpus.join(model), condition, objective)
-            };
-            let name = format!("subdivision/{objective:?}/{model}, {}", condition.name());
-            trials.push(trial(name, corpus.clone(), case));
-        }
         let case = move |_: &Path| symmetry::platonic(objective);
         trials.push(trial(format!("platonic/{objective:?}"), here(), case));
         let case = move |_: &Path| symmetry::mirror(objective);
@@ -104,6 +97,14 @@ fn main() {
             corpus.clone(),
             case,
         ));
+    }
+    // What (9) is near strong cones depends on the mesh, so its optima move with it; see benches/README.md.
+    let objective = ConeObjective::LogScale;
+    for (model, condition) in STABLE {
+        let case =
+            move |corpus: &Path| stability::subdivision(&corpus.join(model), condition, objective);
+        let name = format!("subdivision/{objective:?}/{model}, {}", condition.name());
+        trials.push(trial(name, corpus.clone(), case));
     }
     let case = |corpus: &Path| limits::log_scale_bound(&corpus.join("spot.obj"));
     trials.push(trial("limits/log-scale".into(), corpus.clone(), case));

@@ -84,6 +84,17 @@ pub enum Domain {
     Rectangle,
 }
 
+impl Domain {
+    /// A map of an image as a map of (column + ½, row + ½, 1), whichever points it holds: texel centres, or grid corners.
+    #[must_use]
+    pub fn to_centres(self, texel_to_patch: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
+        match self {
+            Self::Flat => texel_to_patch,
+            Self::Rectangle => texel_to_patch.map(|[a, b, c]| [a, b, c - 0.5 * (a + b)]),
+        }
+    }
+}
+
 /// A maximal chain along which two patches meet, or a patch meets itself or the surface's boundary.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Seam {
