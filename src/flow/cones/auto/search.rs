@@ -29,8 +29,6 @@ const ROUNDING: f64 = 1e-7;
 const STARTS: usize = 20_000;
 /// Passes of exchanges over all cones, each of which must gain.
 const PASSES: usize = 24;
-/// The same while there are more cones than asked for.
-const MANY_PASSES: usize = 3;
 /// Moves whose columns share one sweep of back-substitutions.
 const TOGETHER: usize = 8;
 
@@ -45,15 +43,9 @@ struct Move {
 
 impl Placement<'_> {
     /// Moves cones one by one to where they are worth most, anywhere or (`nearby`) uphill from where they are, until none gains more than
-    /// `least_gain` of the energy, in at most so many passes over all cones.
-    fn exchange(
-        &mut self,
-        mut choice: Choice,
-        least_gain: f64,
-        nearby: bool,
-        passes: usize,
-    ) -> Choice {
-        for _ in 0..passes {
+    /// `least_gain` of the energy.
+    fn exchange(&mut self, mut choice: Choice, least_gain: f64, nearby: bool) -> Choice {
+        for _ in 0..PASSES {
             let promised = self.promised_moves(&choice, least_gain, nearby);
             let moved = promised
                 .chunks(TOGETHER)
@@ -124,7 +116,7 @@ impl Placement<'_> {
                 break;
             }
         }
-        Some(self.exchange(choice, FINE_GAIN, false, PASSES))
+        Some(self.exchange(choice, FINE_GAIN, false))
     }
 
     /// Adds a share more cones, exchanges all, takes away as many, and exchanges what is left; keeps that if it is better.
@@ -132,11 +124,11 @@ impl Placement<'_> {
         let count = choice.sites.len();
         let more = ((share * count as f64) as usize).max(LEAST_MORE);
         let many = self.grow(choice.clone(), count + more);
-        let many = self.exchange(many, COARSE_GAIN, false, MANY_PASSES);
+        let many = self.exchange(many, COARSE_GAIN, false);
         let Some(fewer) = self.prune(many, count) else {
             return choice;
         };
-        let other = self.exchange(fewer, COARSE_GAIN, false, PASSES);
+        let other = self.exchange(fewer, COARSE_GAIN, false);
         // Ways that end at the same places differ by rounding.
         match other.energy < choice.energy * (1.0 - ROUNDING) {
             true => other,
@@ -160,7 +152,7 @@ impl Placement<'_> {
                 continue;
             };
             let start = self.grow(start, count);
-            let choice = self.exchange(start, COARSE_GAIN, false, PASSES);
+            let choice = self.exchange(start, COARSE_GAIN, false);
             let is_better = |b: &Choice| choice.energy < b.energy * (1.0 - ROUNDING);
             if best.as_ref().is_none_or(is_better) {
                 best = Some(choice);
@@ -198,7 +190,7 @@ impl Placement<'_> {
     /// The best curvatures at these places and near them, after u without cones has changed.
     pub(super) fn settle(&mut self, choice: Choice) -> Option<Choice> {
         let weighed = self.choose(choice.sites)?;
-        Some(self.exchange(weighed, FINE_GAIN, true, PASSES))
+        Some(self.exchange(weighed, FINE_GAIN, true))
     }
 
     /// Takes away cones that do not pay, as long as more than `least` are left: those without which the standard deviation of the log
@@ -227,9 +219,9 @@ impl Placement<'_> {
         let mut choice = self.search(least)?;
         while self.largest_deviation(&choice) > bound && choice.sites.len() < most {
             let Some(more) = self.add(&choice) else { break };
-            choice = self.exchange(more, COARSE_GAIN, false, PASSES);
+            choice = self.exchange(more, COARSE_GAIN, false);
         }
-        Some(self.exchange(choice, FINE_GAIN, false, PASSES))
+        Some(self.exchange(choice, FINE_GAIN, false))
     }
 
     /// max |u − mean| over the faces, u of a face being that of its corners on average.
