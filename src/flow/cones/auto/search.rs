@@ -4,8 +4,8 @@
 //!
 //! Greedy addition of the best vertex is Ben-Chen, Gotsman and Bunin 2008 with the least variance in place of the largest
 //! value; that few cones are enough is what Soliman, Slepčev and Crane 2018 and Fang et al. 2021 show with convex relaxations.
-//! Ours is the exact gain of every vertex and the exchange: each cone in turn is taken away and put where it is worth most, until
-//! none wants to move. *Not guaranteed:* the best of all choices.
+//! Ours is the exact gain of every vertex, the exchange (each cone is taken away and put where it is worth most, until none wants to
+//! move) and the detours (more cones than asked for are exchanged too before the least valuable leave). *Not guaranteed:* the best of all choices.
 
 use super::placement::{Choice, Placement};
 
