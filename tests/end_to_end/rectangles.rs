@@ -1,9 +1,10 @@
 //! Rectangles: full grids whose sides fit and hold the same points, on every good fixture; checked from the files alone.
 
 use crate::arrays::array;
-use crate::command::{build, build_into, document, verify};
+use crate::command::{build, build_into, document, program, verify};
 use crate::good::files;
 use affine_atlas::read::atlas::{ImageFolder, StoredImage, read_images};
+use exr::prelude::{FlatSamples, WritableImage, read_all_flat_layers_from_file};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -213,6 +214,31 @@ fn disk_mask() {
 #[test]
 fn three_boundaries_rabbit() {
     rectangles("three-boundaries-rabbit.ply");
+}
+
+/// The last bit of one texel on a side.
+#[test]
+fn a_texel_that_differs_across_a_side_is_found() {
+    let built = build(Path::new("fixtures/good/genus-0-cube.obj"), &[RECTANGLE]);
+    let path = built.atlas().join("images/0000.exr");
+    let mut image = read_all_flat_layers_from_file(&path).expect("readable");
+    for channel in &mut image.layer_data[0].channel_data.list {
+        if let (true, FlatSamples::F32(values)) = (channel.name == *"R", &mut channel.sample_data) {
+            values[3] = values[3].next_up();
+        }
+    }
+    image.write().to_file(&path).expect("writable");
+    let output = program().arg("verify").arg(built.atlas()).output();
+    let said = String::from_utf8(output.expect("the program starts").stdout).expect("UTF-8");
+    let failed: Vec<&str> = said.lines().filter(|l| l.starts_with("FAIL")).collect();
+    let [failed] = failed[..] else {
+        panic!("{said}");
+    };
+    let name = "images of rectangles hold the same points along shared sides";
+    assert!(
+        failed.contains(name) && failed.contains(" 1 of "),
+        "{failed}"
+    );
 }
 
 /// Quads are flattened side by side; nothing depends on which comes first.

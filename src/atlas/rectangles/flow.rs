@@ -111,7 +111,7 @@ pub(super) fn flatten(
         (HalfedgeId::new(3 * f + usize::from(side)), fraction)
     };
     let loops = fine.boundary_loops();
-    let &[ref border] = &loops[..] else {
+    let [border] = &loops[..] else {
         return Err(RectangleError::Inconsistent {
             what: "the border of a quad",
         });
