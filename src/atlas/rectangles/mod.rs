@@ -122,9 +122,11 @@ pub enum RectangleError {
     },
     /// A map to a rectangle is not one to one.
     #[error(
-        "{folded} of the {faces} faces of a rectangle would be turned over, since it is more crowded than float64 can tell; use images.domain = \"flat\", or more cones, which make patches simpler"
+        "rectangle {quad} has {folded} of {faces} faces turned over, since it is more crowded than float64 can tell; use images.domain = \"flat\", or more cones, which make patches simpler"
     )]
     Folded {
+        /// Number of the quad.
+        quad: usize,
         /// Faces that are turned over.
         folded: usize,
         /// Faces of the rectangle.
@@ -192,17 +194,22 @@ fn placed(
     quads: &[Quad],
     curvature_tolerance: f64,
 ) -> Result<(Vec<Rectangle>, Added), RectangleError> {
-    let mut rectangles: Vec<Rectangle> = quads
+    // The error of the first one that has one, whichever is done first.
+    let flattened: Vec<Result<Rectangle, RectangleError>> = quads
         .par_iter()
         .enumerate()
         .map(|(i, quad)| flow::flatten(drawing, quad, i, curvature_tolerance))
-        .collect::<Result<_, _>>()?;
+        .collect();
+    let mut rectangles: Vec<Rectangle> = flattened.into_iter().collect::<Result<_, _>>()?;
     let added = Added::new(drawing, &mut rectangles)?;
     let borders = walls::parameters(drawing, &rectangles)?;
-    rectangles
+    let placed: Vec<Result<(), RectangleError>> = rectangles
         .par_iter_mut()
         .zip(&borders)
-        .try_for_each(|(rectangle, border)| place::place(rectangle, border))?;
+        .enumerate()
+        .map(|(i, (rectangle, border))| place::place(rectangle, border, i))
+        .collect();
+    placed.into_iter().collect::<Result<(), _>>()?;
     Ok((rectangles, added))
 }
 

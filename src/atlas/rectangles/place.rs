@@ -22,10 +22,11 @@ use crate::geometry::ids::{HalfedgeId, VertexVec};
 const ROUNDING: f64 = 1e-15;
 
 /// Sets the coordinates of all corners. `border` says for every piece of the border which side it lies on, and the fractions where
-/// it begins.
+/// it begins; `number` is that of the quad, for errors.
 pub(super) fn place(
     rectangle: &mut Rectangle,
     border: &[(usize, Fractions)],
+    number: usize,
 ) -> Result<(), RectangleError> {
     let c = &rectangle.fine.connectivity;
     let mut at: VertexVec<Option<[f64; 2]>> = VertexVec::filled(None, c.vertex_count());
@@ -71,6 +72,7 @@ pub(super) fn place(
     match folded {
         0 => Ok(()),
         _ => Err(RectangleError::Folded {
+            quad: number,
             folded,
             faces: c.face_count(),
         }),

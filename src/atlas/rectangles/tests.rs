@@ -230,7 +230,7 @@ fn no_border_folds_a_rectangle() {
         let borders = walls::parameters(&fine, &rectangles).unwrap();
         for (rectangle, border) in rectangles.iter_mut().zip(borders) {
             for ends in 0..16 {
-                place::place(rectangle, &crowded(&border, ends)).unwrap();
+                place::place(rectangle, &crowded(&border, ends), 0).unwrap();
                 assert_a_rectangle(name, rectangle);
             }
         }
@@ -249,8 +249,11 @@ fn a_rectangle_that_is_turned_over_is_refused() {
     let at = at.unwrap();
     let (first, second) = (borders[0][at - 1].1, borders[0][at].1);
     (borders[0][at - 1].1, borders[0][at].1) = (second, first);
-    let error = place::place(&mut rectangles[0], &borders[0]).unwrap_err();
-    assert!(matches!(error, RectangleError::Folded { .. }), "{error}");
+    let error = place::place(&mut rectangles[0], &borders[0], 7).unwrap_err();
+    assert!(
+        matches!(error, RectangleError::Folded { quad: 7, .. }),
+        "{error}"
+    );
 }
 
 /// Where nothing moves the harmonic map is nearly the flow's own: edges keep the ratio of their flat lengths.
@@ -259,7 +262,7 @@ fn borders_that_stay_leave_the_conformal_map() {
     for (name, (fine, quads)) in surfaces() {
         for mut rectangle in flattened(&fine, &quads) {
             let border = own_fractions(&rectangle);
-            place::place(&mut rectangle, &border).unwrap();
+            place::place(&mut rectangle, &border, 0).unwrap();
             let c = &rectangle.fine.connectivity;
             let uv = |v: VertexId| rectangle.fine.corner[c.vertex_halfedge(v)].uv;
             let flat = &rectangle.layout.connectivity;
