@@ -17,7 +17,7 @@
 //! *Guaranteed:* patches are injective, as harmonic maps to convex shapes are; every side of a rectangle is a whole side of its
 //! neighbour, corner to corner, with as many samples (`counts`), and sample i of n from one corner is the same point for both, to the
 //! last bit in the images. Spline patches fitted to two images can so share the control points of their common border.
-//! *Not guaranteed:* conformal maps, though they would be where both sides of every wall agreed; smoothness across walls; a bound for the
+//! *Not guaranteed:* conformal maps, though they nearly would be where both sides of every wall agreed; smoothness across walls; a bound for the
 //! log scale inside a rectangle.
 //!
 //! The tutorial shows rectangles for disks only (Fig. 10 and 18, four corners of π/2); quads by joining centres to middles are
