@@ -6,7 +6,9 @@
 //! point there: the faces are rasterised one by one, positions are interpolated on the face in `f64`
 //! and rounded once. A centre on an edge belongs to the lower face. Outside, every channel is that of
 //! the nearest covered texel (of several the one further left, then further up), so no value is ever
-//! missing. The same for any number of threads.
+//! missing. Along a side that two rectangles share both images hold the same points (`shared`). The same for any number of threads.
+
+mod shared;
 
 use crate::atlas::patches::raster::{cover, to_texel};
 use crate::atlas::patches::{Domain, Patch, PatchLayout};
@@ -76,12 +78,14 @@ pub fn sample(
             .iter()
             .find(|a| a.kind == AttributeKind::Normal && a.components == 3),
     };
-    layout
+    let mut images: Vec<GeometryImage> = layout
         .patches
         .par_iter()
         .zip(faces)
         .map(|(patch, faces)| sample_patch(&surface, layout, patch, &faces))
-        .collect()
+        .collect();
+    shared::unite(layout, &mut images);
+    images
 }
 
 struct Surface<'a> {

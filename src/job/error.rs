@@ -92,11 +92,9 @@ impl BuildError {
             BuildError::Chart(ChartError::Develop(_)) => FailureKind::NotConverged,
             BuildError::Patch(PatchError::NotFinite { .. }) => FailureKind::NotConverged,
             BuildError::Patch(_) => FailureKind::Prescription,
-            BuildError::Rectangle(
-                RectangleError::Flow { .. }
-                | RectangleError::NotStraight { .. }
-                | RectangleError::Develop(_),
-            ) => FailureKind::NotConverged,
+            BuildError::Rectangle(RectangleError::Flow { .. } | RectangleError::Unequal { .. }) => {
+                FailureKind::NotConverged
+            }
             BuildError::Rectangle(_) => FailureKind::Internal,
             BuildError::Export(error) if error.is_internal() => FailureKind::Internal,
             BuildError::Export(_) => FailureKind::Output,

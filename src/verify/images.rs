@@ -5,6 +5,7 @@ use super::arrays::Arrays;
 use super::document::{Document, Patch};
 use super::formulas::{Point2, Point3, Worst, diagonal3, mix3, norm3};
 use super::patches::Groups;
+use super::shared::{self, Sides};
 use crate::read::exr::{self, Image, Read};
 use rayon::prelude::*;
 use std::path::Path;
@@ -36,6 +37,7 @@ struct Tally {
     wrong_face: usize,
     wrong_normal: usize,
     wrong_log_scale: usize,
+    sides: Option<Sides>,
 }
 
 pub(super) fn check(
@@ -46,7 +48,7 @@ pub(super) fn check(
     verdicts: &mut Verdicts,
 ) {
     let size = diagonal3(&arrays.positions);
-    let tallies: Vec<Tally> = document
+    let mut tallies: Vec<Tally> = document
         .patches
         .par_iter()
         .map(|patch| {
@@ -63,6 +65,9 @@ pub(super) fn check(
                         }
                     }
                     tally.text = check_text(image.text.as_deref(), patch, document);
+                    if patch.domain == "rectangle" {
+                        tally.sides = Some(shared::sides(&image, patch));
+                    }
                     let faces = groups.of(patch.id);
                     Raster::new(arrays, document, patch, faces, size).compare(&image, &mut tally);
                 }
@@ -73,6 +78,8 @@ pub(super) fn check(
         })
         .collect();
     report(document, &tallies, verdicts);
+    let sides: Vec<Option<Sides>> = tallies.iter_mut().map(|t| t.sides.take()).collect();
+    shared::check(arrays, document, &sides, verdicts);
 }
 
 fn report(document: &Document, tallies: &[Tally], verdicts: &mut Verdicts) {

@@ -25,6 +25,7 @@ mod metric;
 mod patches;
 mod quality;
 mod seams;
+mod shared;
 mod source;
 mod surface;
 mod transitions;

@@ -22,6 +22,19 @@ pub struct Carrier {
     pub fraction: f64,
 }
 
+impl Carrier {
+    /// The place in coordinates that are given for every corner of the layout.
+    #[inline]
+    pub fn place(self, layout: &Connectivity, at: impl Fn(HalfedgeId) -> [f64; 2]) -> [f64; 2] {
+        let tail = at(self.halfedge);
+        if self.fraction == 0.0 {
+            return tail;
+        }
+        let head = at(layout.next(self.halfedge));
+        std::array::from_fn(|i| (1.0 - self.fraction) * tail[i] + self.fraction * head[i])
+    }
+}
+
 /// The triangulation that is cut and developed; see the module docs.
 #[derive(Clone, Debug)]
 pub struct Layout {
@@ -88,13 +101,7 @@ impl Layout {
     /// The overlay corner in coordinates that are given for every layout corner.
     #[inline]
     pub fn place(&self, corner: HalfedgeId, at: impl Fn(HalfedgeId) -> [f64; 2]) -> [f64; 2] {
-        let Carrier { halfedge, fraction } = self.carrier(corner);
-        let tail = at(halfedge);
-        if fraction == 0.0 {
-            return tail;
-        }
-        let head = at(self.connectivity.next(halfedge));
-        std::array::from_fn(|i| (1.0 - fraction) * tail[i] + fraction * head[i])
+        self.carrier(corner).place(&self.connectivity, at)
     }
 
     /// The overlay halfedges that make up a layout halfedge, in its direction; none for a diagonal.

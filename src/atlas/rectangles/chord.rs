@@ -7,24 +7,18 @@
 //! sides. It is what marching triangles give: each vertex has one sign, so a face is crossed at most once, and a level line can leave
 //! the disk only where the border changes its sign, which is at the two places.
 //!
-//! The numbers are harmonic (Σ w (h_j − h_i) = 0 with the cotangent weights of the surface in space): with ±1 on the border the line is
-//! the hyperbolic geodesic between the places, smooth and far from the border. Weights that are not positive, of edges that are not
-//! Delaunay, are raised, so that the maximum principle holds; the line is then less smooth there, no less valid.
+//! The numbers are harmonic ([`harmonic`](super::harmonic)): with ±1 on the border the line is the hyperbolic geodesic between the
+//! places, smooth and far from the border.
 
 use super::RectangleError;
 use super::disk::Disk;
 use super::subdivision::Subdivision;
-use crate::flow::solve::SymmetricSolver;
 use crate::geometry::ids::{EdgeId, EdgeVec, HalfedgeId, VertexId, VertexVec};
-use crate::geometry::triangle::{angles, cotangents};
+use crate::geometry::triangle::angles;
 use std::f64::consts::FRAC_PI_2;
 
 /// A crossing lies at least this part of an edge from its ends, so that no face becomes a sliver.
 const CLEARANCE: f64 = 0.15;
-/// Least weight of an edge, in units of the cotangent of π/4.
-const LEAST_WEIGHT: f64 = 1e-3;
-/// Largest weight, so that slivers do not spoil the condition.
-const LARGEST_WEIGHT: f64 = 1e6;
 
 /// Where a line crosses an edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,77 +29,6 @@ pub(super) struct Crossing {
     pub fraction: f64,
     /// The ends of the edge in the disk, and the fraction from the first to the second.
     pub between: ([VertexId; 2], f64),
-}
-
-/// Functions on a disk that are harmonic inside, one for each set of border values (in the order of the border's places).
-pub(super) fn harmonic(
-    fine: &Subdivision,
-    disk: &Disk,
-    border_values: &[Vec<f64>],
-) -> Result<Vec<VertexVec<f64>>, RectangleError> {
-    let c = &disk.connectivity;
-    let weight = weights(disk, &disk.lengths(fine));
-    let mut unknown = VertexVec::filled(u32::MAX, c.vertex_count());
-    let mut unknowns = 0;
-    for v in c.vertices().filter(|&v| !c.is_boundary_vertex(v)) {
-        unknown[v] = unknowns;
-        unknowns += 1;
-    }
-    let mut place = VertexVec::filled(usize::MAX, c.vertex_count());
-    for (i, &h) in disk.border.iter().enumerate() {
-        place[c.tail(h)] = i;
-    }
-    let size = unknowns as usize;
-    let mut diagonal = vec![0.0; size];
-    let mut pairs = Vec::with_capacity(c.edge_count());
-    let mut values = Vec::with_capacity(c.edge_count());
-    let mut rhs = vec![0.0; size * border_values.len()];
-    for e in c.edges() {
-        let ends = c.edge_vertices(e);
-        let w = weight[e];
-        for (v, other) in [(ends[0], ends[1]), (ends[1], ends[0])] {
-            let row = unknown[v] as usize;
-            if row >= size {
-                continue;
-            }
-            diagonal[row] += w;
-            if unknown[other] as usize >= size {
-                for (k, given) in border_values.iter().enumerate() {
-                    rhs[k * size + row] += w * given[place[other]];
-                }
-            } else if row < unknown[other] as usize {
-                pairs.push([unknown[v], unknown[other]]);
-                values.push(-w);
-            }
-        }
-    }
-    let mut solver = SymmetricSolver::new(size, &pairs)?;
-    solver.factorize(&diagonal, &values)?;
-    solver.solve(&mut rhs);
-    let whole = |(k, given): (usize, &Vec<f64>)| {
-        let value = |v| match unknown[v] {
-            u32::MAX => given[place[v]],
-            row => rhs[k * size + row as usize],
-        };
-        c.vertices().map(value).collect()
-    };
-    Ok(border_values.iter().enumerate().map(whole).collect())
-}
-
-/// Positive weights: cotangents, raised where they are too small.
-fn weights(disk: &Disk, length: &EdgeVec<f64>) -> EdgeVec<f64> {
-    let c = &disk.connectivity;
-    let mut weight = EdgeVec::filled(0.0, c.edge_count());
-    for f in c.faces() {
-        let edges = c.face_edges(f);
-        // A face without area pulls nothing.
-        let cotangent = cotangents(edges.map(|e| length[e])).unwrap_or_default();
-        for k in 0..3 {
-            weight[edges[k]] += 0.5 * cotangent[k];
-        }
-    }
-    let bounded = |&w: &f64| w.clamp(LEAST_WEIGHT, LARGEST_WEIGHT);
-    weight.iter().map(bounded).collect()
 }
 
 /// Makes a line leave a place of the border in a certain direction: where the angle there is divided as |after| : |before|, numbers

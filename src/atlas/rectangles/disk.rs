@@ -4,6 +4,7 @@
 //! vertex that the walls meet several times has as many copies. *Guaranteed:* one face set, one border, χ = 1, or an error.
 
 use super::RectangleError;
+use super::harmonic::harmonic;
 use super::subdivision::Subdivision;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{
@@ -106,6 +107,16 @@ impl Disk {
     /// The vertex of the subdivision where a place on the border begins.
     pub fn border_vertex(&self, place: usize) -> VertexId {
         self.vertex[self.connectivity.tail(self.border[place])]
+    }
+
+    /// Functions that are harmonic in space, one for each set of border values (in the order of the border's places).
+    pub fn harmonic(
+        &self,
+        fine: &Subdivision,
+        border_values: &[Vec<f64>],
+    ) -> Result<Vec<VertexVec<f64>>, RectangleError> {
+        let length = self.lengths(fine);
+        harmonic(&self.connectivity, &length, &self.border, border_values)
     }
 
     /// Lengths of all edges in space.

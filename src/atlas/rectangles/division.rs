@@ -9,7 +9,7 @@
 //! which becomes a node for the neighbour too. Of all such lines the one is drawn that is shortest for the border that it cuts off.
 
 use super::RectangleError;
-use super::chord::{Crossing, aim, harmonic, zero_level};
+use super::chord::{Crossing, aim, zero_level};
 use super::disk::{Disk, region};
 use super::sides::{Drawing, Role};
 use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, FaceVec, HalfedgeId, VertexId, VertexVec};
@@ -92,7 +92,7 @@ fn draw_between(
     let ahead = |place: usize| (place + n - from) % n < (to + n - from) % n;
     let given = (0..n).map(|p| if ahead(p) { -1.0 } else { 1.0 }).collect();
     let mut value =
-        harmonic(&drawing.fine, disk, &[given])?
+        disk.harmonic(&drawing.fine, &[given])?
             .pop()
             .ok_or(RectangleError::Inconsistent {
                 what: "the sides of a patch",
@@ -129,7 +129,7 @@ fn visibility(
         (0..n).map(value).collect()
     };
     let given: Vec<Vec<f64>> = (0..sides).map(around).collect();
-    let measures = harmonic(&drawing.fine, disk, &given)?;
+    let measures = disk.harmonic(&drawing.fine, &given)?;
     let c = &disk.connectivity;
     let least = |v: VertexId| measures.iter().map(|m| m[v]).fold(1.0, f64::min);
     let inner = c.vertices().filter(|&v| !c.is_boundary_vertex(v));

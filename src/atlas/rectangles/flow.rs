@@ -1,43 +1,59 @@
-//! A quad flattened to a rectangle by the Ricci flow: π/2 at its four corners, nothing elsewhere.
+//! A quad flattened by the Ricci flow: π/2 at its four corners, nothing elsewhere, which makes it a rectangle.
 //!
-//! *Enters:* a quad. *Leaves:* a [`Rectangle`]: the quad refined by the triangulation that the flow ended with, on whose faces
-//! coordinates in [0, 1] × [0, height] are linear; the height (at most 1) is the modulus of the quad, which the flow finds.
-//! *Guaranteed:* the border lies on the sides of the rectangle to the last bit, its corners on the corners. Before they were put there
-//! its vertices lay within [`STRAIGHT`] of it.
+//! *Enters:* a quad. *Leaves:* a [`Rectangle`]: the quad refined by the triangulation that the flow ended with, the flat lengths along its
+//! border, and the height (at most 1) over the width, which is the modulus of the quad: the flow finds it. Where its vertices lie in
+//! the rectangle is not said here; see [`place`](super::place).
+//! *Guaranteed:* opposite sides are of one length up to [`UNEQUAL`].
 //! Every prescription of this kind is met (Gauss, Bonnet: 4 · π/2 = 2π χ), whatever the mesh: see [`ricci`].
 
 use super::RectangleError;
 use super::quads::Quad;
 use super::subdivision::{Corner, Subdivision};
-use crate::atlas::cut;
-use crate::atlas::develop::{self, Development};
-use crate::atlas::overlay::{self, OnBase, Overlay};
-use crate::atlas::plane::{distance, rotate};
+use crate::atlas::overlay::{self, Carrier, Layout, OnBase, Overlay};
 use crate::flow::cones::{BoundaryCondition, Prescription};
 use crate::flow::ricci::{self, FlowParams};
 use crate::geometry::ids::{EdgeId, FaceVec, HalfedgeId, HalfedgeVec, NONE, VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
 use std::f64::consts::FRAC_PI_2;
+use std::ops::Range;
 
-/// Largest distance of a border vertex from its side, in diagonals of the rectangle.
-pub(super) const STRAIGHT: f64 = 1e-8;
+/// Largest difference of opposite sides, in widths of the rectangle.
+pub(super) const UNEQUAL: f64 = 1e-8;
 
 /// A flattened quad.
 pub(super) struct Rectangle {
-    /// Its faces, subdivided; `uv` of the corners is set, `parent` is a face of the *drawing*, `weights` and `position` are not those
-    /// of the surface yet.
+    /// Its faces, subdivided; `parent` is a face of the *drawing*, `weights` and `position` are not those of the surface yet, and `uv`
+    /// is not set.
     pub fine: Subdivision,
     /// Which vertex of the drawing the first vertices are; all others are new.
     pub known: VertexVec<VertexId>,
-    /// Edges on the border, in the order of the border: halfedge of the drawing that each lies on, edge, and the fraction along
-    /// that halfedge where it begins.
-    pub border: Vec<(HalfedgeId, EdgeId, f64)>,
+    /// The border, counterclockwise from the first corner on.
+    pub border: Vec<Piece>,
+    /// Corners of the quad, counterclockwise: own vertices.
+    pub corners: [VertexId; 4],
     /// Height over width.
     pub height: f64,
     /// Which corner of the quad is the origin; the next one lies at (1, 0).
     pub origin: usize,
-    /// Largest distance of a border vertex from its side, in diagonals.
-    pub bend: f64,
+    /// Difference of opposite sides, in widths.
+    pub unequal: f64,
+    /// The triangulation that the flow ended with: flat, Delaunay but where the border cut it. Its vertices are the first ones.
+    pub layout: Layout,
+    /// Where on it the vertices lie that the flow left.
+    pub carrier: VertexVec<Carrier>,
+}
+
+/// An edge on the border of a rectangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Piece {
+    /// Halfedge of the drawing that it lies on.
+    pub wall: HalfedgeId,
+    /// The edge.
+    pub edge: EdgeId,
+    /// Fraction along the halfedge where it begins.
+    pub from: f64,
+    /// Flat length, in any unit.
+    pub length: f64,
 }
 
 /// Flattens a quad of a drawing.
@@ -76,18 +92,12 @@ pub(super) fn flatten(
     };
     let Overlay {
         mesh,
-        prescription,
+        metric,
         layout,
         on_base,
         ..
     } = overlay::overlay(mesh, metric, prescription)?;
-    let cost = layout.cut_cost(&mesh);
-    let layout_cut = cut::cut(&layout.connectivity, &cost, &prescription)?;
-    let cut = layout.lift(&layout_cut, &mesh.connectivity);
-    let unfolded = develop::develop(&layout, layout_cut)?;
-    let plane = Development::place(&mesh.connectivity, &cut, &layout, &unfolded);
     let fine = &mesh.connectivity;
-    let place = |h: HalfedgeId| plane.uv[fine.face(h)][fine.corner(h)];
     // Base faces, and where on them the corners lie.
     let base = |h: HalfedgeId| -> (HalfedgeId, f64) {
         let f = mesh.source_face[fine.face(h)] as usize;
@@ -101,46 +111,59 @@ pub(super) fn flatten(
         (HalfedgeId::new(3 * f + usize::from(side)), fraction)
     };
     let loops = fine.boundary_loops();
-    let border = loops.first().filter(|_| loops.len() == 1);
-    let border = border.ok_or(RectangleError::Inconsistent {
-        what: "the border of a quad",
-    })?;
-    let framed = frame(border, &corners, |h| (fine.tail(h), place(h)))?;
-    if framed.bend > STRAIGHT {
-        return Err(RectangleError::NotStraight {
+    let [border] = &loops[..] else {
+        return Err(RectangleError::Inconsistent {
+            what: "the border of a quad",
+        });
+    };
+    let piece = |&h: &HalfedgeId| {
+        let (along, from) = base(h);
+        Piece {
+            wall: disk.halfedge(drawing, along),
+            edge: fine.edge(h),
+            from,
+            length: metric.length[fine.edge(h)],
+        }
+    };
+    let mut border: Vec<HalfedgeId> = border.clone();
+    let first = border.iter().position(|&h| fine.tail(h) == corners[0]);
+    border.rotate_left(first.unwrap_or(0));
+    let pieces: Vec<Piece> = border.iter().map(piece).collect();
+    let tails: Vec<VertexId> = border.iter().map(|&h| fine.tail(h)).collect();
+    let side = sides(&tails, &corners)?.map(|side| pieces[side].iter().map(|p| p.length).sum());
+    let shape = Shape::new(side)?;
+    if shape.unequal > UNEQUAL {
+        return Err(RectangleError::Unequal {
             quad: number,
-            bend: framed.bend,
-            bound: STRAIGHT,
+            difference: shape.unequal,
+            bound: UNEQUAL,
         });
     }
-    let mut on_border: VertexVec<Option<[f64; 2]>> = VertexVec::filled(None, fine.vertex_count());
-    for (&h, &uv) in border.iter().zip(&framed.border) {
-        on_border[fine.tail(h)] = Some(uv);
-    }
-    let uv = |h: HalfedgeId| match on_border[fine.tail(h)] {
-        Some(uv) => uv,
-        None => framed.place(place(h)),
-    };
     let corner = |h: HalfedgeId| {
         let (along, t) = base(h);
         let k = along.index() % 3;
         let mut weights = [0.0; 3];
         weights[k] = 1.0 - t;
         weights[(k + 1) % 3] += t;
-        Corner { weights, uv: uv(h) }
+        Corner {
+            weights,
+            uv: [0.0; 2],
+        }
     };
     let corner: HalfedgeVec<Corner> = fine.halfedges().map(corner).collect();
     let parent = mesh.source_face.iter().map(|&f| disk.faces[f as usize]);
-    let drawn = |&h: &HalfedgeId| {
-        let (along, t) = base(h);
-        (disk.halfedge(drawing, along), fine.edge(h), t)
-    };
+    let carrier = fine
+        .vertices()
+        .map(|v| layout.carrier(fine.vertex_halfedge(v)));
     Ok(Rectangle {
         known: disk.vertex.clone(),
-        border: border.iter().map(drawn).collect(),
-        height: framed.height,
-        origin: framed.origin,
-        bend: framed.bend,
+        border: pieces,
+        corners,
+        height: shape.height,
+        origin: shape.origin,
+        unequal: shape.unequal,
+        carrier: carrier.collect(),
+        layout,
         fine: Subdivision {
             corner,
             parent: parent.collect(),
@@ -150,87 +173,80 @@ pub(super) fn flatten(
     })
 }
 
-/// How a developed quad is turned and scaled.
-struct Frame {
-    from: [f64; 2],
-    angle: f64,
-    scale: f64,
+/// The parts of a border, which begins at the first corner, between corners.
+pub(super) fn sides(
+    tails: &[VertexId],
+    corners: &[VertexId; 4],
+) -> Result<[Range<usize>; 4], RectangleError> {
+    let mut places = [0, 0, 0, 0, tails.len()];
+    for (place, &corner) in places.iter_mut().zip(corners) {
+        let found = tails.iter().position(|&v| v == corner);
+        *place = found.unwrap_or(tails.len());
+    }
+    let is_in_order = places[0] == 0 && places.windows(2).all(|p| p[0] < p[1]);
+    match is_in_order {
+        true => Ok([0, 1, 2, 3].map(|k| places[k]..places[k + 1])),
+        false => Err(RectangleError::Inconsistent {
+            what: "the corners of a quad",
+        }),
+    }
+}
+
+/// What four sides make.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Shape {
     height: f64,
     origin: usize,
-    bend: f64,
-    /// Coordinates of the border, exactly on the sides.
-    border: Vec<[f64; 2]>,
+    unequal: f64,
 }
 
-impl Frame {
-    fn turned(&self, p: [f64; 2]) -> [f64; 2] {
-        let d = [p[0] - self.from[0], p[1] - self.from[1]];
-        rotate(d, -self.angle).map(|x| x / self.scale)
-    }
-
-    /// Inside nothing lies beyond the sides but by rounding.
-    fn place(&self, p: [f64; 2]) -> [f64; 2] {
-        let [x, y] = self.turned(p);
-        [x.clamp(0.0, 1.0), y.clamp(0.0, self.height)]
-    }
-}
-
-/// Lays the longer side between corners along u.
-fn frame(
-    border: &[HalfedgeId],
-    corners: &[VertexId; 4],
-    at: impl Fn(HalfedgeId) -> (VertexId, [f64; 2]),
-) -> Result<Frame, RectangleError> {
-    let error = || RectangleError::Inconsistent {
-        what: "the corners of a quad",
-    };
-    let mut places = [0; 4];
-    for (place, &v) in places.iter_mut().zip(corners) {
-        *place = border
-            .iter()
-            .position(|&h| at(h).0 == v)
-            .ok_or_else(error)?;
-    }
-    let points = places.map(|place| at(border[place]).1);
-    let side = |k: usize| distance(points[k % 4], points[(k + 1) % 4]);
-    let (long, short) = (side(0) + side(2), side(1) + side(3));
-    // What is square to rounding begins at the centre.
-    let origin = usize::from(short > long * (1.0 + 1e-9));
-    let (p, q) = (points[origin], points[origin + 1]);
-    let scale = 0.5 * (side(origin) + side(origin + 2));
-    let height = 0.5 * (side(origin + 1) + side(origin + 3)) / scale;
-    if !(scale > 0.0 && height > 0.0 && height.is_finite()) {
-        return Err(error());
-    }
-    let mut frame = Frame {
-        from: p,
-        angle: (q[1] - p[1]).atan2(q[0] - p[0]),
-        scale,
-        height,
-        origin,
-        bend: 0.0,
-        border: vec![[0.0; 2]; border.len()],
-    };
-    let n = border.len();
-    let diagonal = 1.0f64.hypot(height);
-    let mut exact = vec![[0.0; 2]; n];
-    for k in 0..4 {
-        let (from, to) = (places[(origin + k) % 4], places[(origin + k + 1) % 4]);
-        let count = (to + n - from) % n;
-        for i in 0..count {
-            let place = (from + i) % n;
-            let [x, y] = frame.turned(at(border[place]).1);
-            let inside = [x.clamp(0.0, 1.0), y.clamp(0.0, height)];
-            let corner = i == 0;
-            exact[place] = match k {
-                0 => [if corner { 0.0 } else { inside[0] }, 0.0],
-                1 => [1.0, if corner { 0.0 } else { inside[1] }],
-                2 => [if corner { 1.0 } else { inside[0] }, height],
-                _ => [0.0, if corner { height } else { inside[1] }],
-            };
-            frame.bend = frame.bend.max(distance([x, y], exact[place]) / diagonal);
+impl Shape {
+    /// Lays the longer side along u.
+    fn new(side: [f64; 4]) -> Result<Self, RectangleError> {
+        let (long, short) = (side[0] + side[2], side[1] + side[3]);
+        // What is square to rounding begins at the centre.
+        let origin = usize::from(short > long * (1.0 + 1e-9));
+        let (width, height) = match origin {
+            0 => (0.5 * long, 0.5 * short),
+            _ => (0.5 * short, 0.5 * long),
+        };
+        let shape = Self {
+            height: height / width,
+            origin,
+            unequal: (side[0] - side[2]).abs().max((side[1] - side[3]).abs()) / width,
+        };
+        match shape.height > 0.0 && shape.height.is_finite() && shape.unequal.is_finite() {
+            true => Ok(shape),
+            false => Err(RectangleError::Inconsistent {
+                what: "the sides of a quad",
+            }),
         }
     }
-    frame.border = exact;
-    Ok(frame)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_longer_side_lies_along_u() {
+        let shape = Shape::new([1.0, 4.0, 1.0, 4.0 + 4e-9]).unwrap();
+        assert_eq!(shape.origin, 1);
+        assert!((shape.height - 0.25).abs() < 1e-9);
+        assert!((shape.unequal - 1e-9).abs() < 1e-12);
+        // What is square up to rounding begins at the first corner.
+        assert_eq!(Shape::new([1.0, 1.0 + 1e-10, 1.0, 1.0]).unwrap().origin, 0);
+        assert!(Shape::new([0.0; 4]).is_err());
+        assert!(Shape::new([1.0, f64::NAN, 1.0, 1.0]).is_err());
+    }
+
+    #[test]
+    fn sides_lie_between_corners() {
+        let tails = [7, 3, 1, 0, 5].map(VertexId::new);
+        let corners = [7, 3, 0, 5].map(VertexId::new);
+        let found = sides(&tails, &corners).unwrap();
+        assert_eq!(found, [0..1, 1..3, 3..4, 4..5]);
+        assert!(sides(&tails, &[7, 0, 3, 5].map(VertexId::new)).is_err());
+        assert!(sides(&tails, &[7, 3, 0, 2].map(VertexId::new)).is_err());
+    }
 }

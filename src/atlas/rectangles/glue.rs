@@ -1,13 +1,13 @@
 //! The rectangles put together again to one surface.
 //!
-//! *Enters:* a drawing and the rectangle of every quad, each refined on its own. *Leaves:* a [`Subdivision`] of the surface with
-//! coordinates in the rectangles. *Guaranteed:* an oriented surface without a crack: what either side of a wall added to it, the other
-//! side gets too, by splitting its border edge there (coordinates are linear along it, so nothing moves).
+//! *Enters:* a drawing and the rectangle of every quad, each refined on its own. *Leaves:* first rectangles whose borders fit
+//! ([`Added::new`]), then, when they have coordinates, a [`Subdivision`] of the surface. *Guaranteed:* an oriented surface without a crack:
+//! what either side of a wall added to it, the other side gets too, by splitting its border edge there.
 //!
 //! The final triangulation of a quad is that of its double, whose edges may cross the border, at a right angle: hence the new vertices.
 
 use super::RectangleError;
-use super::flow::Rectangle;
+use super::flow::{Piece, Rectangle};
 use super::subdivision::{Corner, Subdivision};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{
@@ -26,19 +26,37 @@ struct OnWall {
     has: [bool; 2],
 }
 
+/// The vertices that are put on every edge of a drawing, in the direction of its halfedge.
+pub(super) struct Added(EdgeVec<Vec<OnWall>>);
+
+impl Added {
+    /// Gives every rectangle the vertices that the other sides of its walls have.
+    pub fn new(
+        drawing: &Subdivision,
+        rectangles: &mut [Rectangle],
+    ) -> Result<Self, RectangleError> {
+        let added = merge(drawing, rectangles);
+        for rectangle in rectangles {
+            insert(drawing, rectangle, &added)?;
+        }
+        Ok(Self(added))
+    }
+}
+
 /// The whole surface, and the rectangle of every face.
 pub(super) fn glue(
     drawing: &Subdivision,
-    mut rectangles: Vec<Rectangle>,
+    rectangles: &[Rectangle],
+    Added(added): &Added,
 ) -> Result<(Subdivision, Vec<PatchId>), RectangleError> {
     let c = &drawing.connectivity;
-    let added = merge(drawing, &rectangles);
     // Edges of a rectangle along every halfedge of the drawing, with the rectangle's number.
     let mut pieces: HalfedgeVec<(usize, Vec<EdgeId>)> =
         HalfedgeVec::filled((usize::MAX, Vec::new()), c.halfedge_count());
-    for (i, rectangle) in rectangles.iter_mut().enumerate() {
-        for (h, edges) in insert(drawing, rectangle, &added)? {
-            pieces[h] = (i, edges);
+    for (i, rectangle) in rectangles.iter().enumerate() {
+        for piece in &rectangle.border {
+            pieces[piece.wall].0 = i;
+            pieces[piece.wall].1.push(piece.edge);
         }
     }
     let mut position = drawing.position.clone();
@@ -65,13 +83,14 @@ pub(super) fn glue(
         while vertex.len() < own.vertex_count() {
             vertex.push(NONE);
         }
-        for h in rectangle.walls() {
+        for own_pieces in rectangle.border.chunk_by(|a, b| a.wall == b.wall) {
+            let h = own_pieces[0].wall;
             let e = c.edge(h);
             let forward = c.edge_halfedge(e) == h;
             let count = added[e].len();
-            for (k, &piece) in pieces[h].1.iter().enumerate().skip(1) {
+            for (k, piece) in own_pieces.iter().enumerate().skip(1) {
                 let at = if forward { k - 1 } else { count - k };
-                vertex[own.tail(own.edge_halfedge(piece))] = (first_on_wall[e] + at) as u32;
+                vertex[own.tail(own.edge_halfedge(piece.edge))] = (first_on_wall[e] + at) as u32;
             }
         }
         for v in own
@@ -141,10 +160,14 @@ fn merge(drawing: &Subdivision, rectangles: &[Rectangle]) -> EdgeVec<Vec<OnWall>
     let mut sides: EdgeVec<[Vec<f64>; 2]> =
         EdgeVec::filled([Vec::new(), Vec::new()], c.edge_count());
     for rectangle in rectangles {
-        for &(h, _, t) in rectangle.border.iter().filter(|b| b.2 > 0.0) {
-            let e = c.edge(h);
-            let forward = c.edge_halfedge(e) == h;
-            let fraction = if forward { t } else { 1.0 - t };
+        for piece in rectangle.border.iter().filter(|piece| piece.from > 0.0) {
+            let e = c.edge(piece.wall);
+            let forward = c.edge_halfedge(e) == piece.wall;
+            let fraction = if forward {
+                piece.from
+            } else {
+                1.0 - piece.from
+            };
             sides[e][usize::from(!forward)].push(fraction);
         }
     }
@@ -177,37 +200,22 @@ fn merged(left: &[f64], right: &[f64]) -> Vec<OnWall> {
     all
 }
 
-impl Rectangle {
-    /// The halfedges of the drawing along the border, in order.
-    fn walls(&self) -> Vec<HalfedgeId> {
-        let mut walls: Vec<HalfedgeId> = self.border.iter().map(|b| b.0).collect();
-        walls.dedup();
-        if walls.len() > 1 && walls.first() == walls.last() {
-            walls.pop();
-        }
-        walls
-    }
-}
-
-/// Gives a rectangle the vertices that the other sides of its walls added. The edges along every halfedge of the drawing.
+/// Gives a rectangle the vertices that the other sides of its walls added.
 fn insert(
     drawing: &Subdivision,
     rectangle: &mut Rectangle,
     added: &EdgeVec<Vec<OnWall>>,
-) -> Result<Vec<(HalfedgeId, Vec<EdgeId>)>, RectangleError> {
+) -> Result<(), RectangleError> {
     let unfit = RectangleError::Inconsistent {
         what: "the border of a quad",
     };
     let c = &drawing.connectivity;
-    // Begin where a wall begins.
-    let start = rectangle.border.iter().position(|b| b.2 == 0.0);
-    let mut border = rectangle.border.clone();
-    border.rotate_left(start.unwrap_or(0));
-    let mut result = Vec::with_capacity(border.len());
-    for own in border.chunk_by(|a, b| a.0 == b.0) {
-        let h = own[0].0;
-        let e = c.edge(h);
-        let forward = c.edge_halfedge(e) == h;
+    let fine = &mut rectangle.fine;
+    let mut border: Vec<Piece> = Vec::with_capacity(rectangle.border.len());
+    for own in rectangle.border.chunk_by(|a, b| a.wall == b.wall) {
+        let wall = own[0].wall;
+        let e = c.edge(wall);
+        let forward = c.edge_halfedge(e) == wall;
         let mut wanted: Vec<(f64, bool)> = added[e]
             .iter()
             .map(|x| match forward {
@@ -218,31 +226,35 @@ fn insert(
         if !forward {
             wanted.reverse();
         }
-        let mut edges = vec![own[0].1];
-        let (mut next, mut from) = (1, own[0].2);
-        for (fraction, has) in wanted {
+        let mut next = 1;
+        let mut last = own[0];
+        for (from, has) in wanted {
             if has {
-                let &(_, edge, t) = own.get(next).ok_or_else(|| unfit.clone())?;
-                edges.push(edge);
-                (next, from) = (next + 1, t);
+                let following = *own.get(next).ok_or_else(|| unfit.clone())?;
+                border.push(std::mem::replace(&mut last, following));
+                next += 1;
                 continue;
             }
-            let to = own.get(next).map_or(1.0, |b| b.2);
-            let t = ((fraction - from) / (to - from)).clamp(SAME, 1.0 - SAME);
-            let fine = &mut rectangle.fine;
-            let second = EdgeId::new(fine.connectivity.edge_count());
-            if let Some(&edge) = edges.last() {
-                fine.split_edge(edge, if t.is_finite() { t } else { 0.5 });
-            }
-            edges.push(second);
-            from = fraction;
+            let to = own.get(next).map_or(1.0, |piece| piece.from);
+            let t = ((from - last.from) / (to - last.from)).clamp(SAME, 1.0 - SAME);
+            let t = if t.is_finite() { t } else { 0.5 };
+            let second = Piece {
+                wall,
+                edge: EdgeId::new(fine.connectivity.edge_count()),
+                from,
+                length: (1.0 - t) * last.length,
+            };
+            fine.split_edge(last.edge, t);
+            last.length *= t;
+            border.push(std::mem::replace(&mut last, second));
         }
+        border.push(last);
         if next != own.len() {
             return Err(unfit);
         }
-        result.push((h, edges));
     }
-    Ok(result)
+    rectangle.border = border;
+    Ok(())
 }
 
 #[cfg(test)]

@@ -4,19 +4,21 @@
 //! rectangles: each is sampled corner to corner, a full grid without a mask.
 //!
 //! ```text
-//! flat patches → sides and nodes → division → middles → quads → Ricci flow of each → rectangles glued → charts carried over
+//! flat patches → sides and nodes → division → middles → quads → Ricci flow of each → common parameter of walls → harmonic maps
+//! → rectangles glued → charts carried over
 //! ```
 //!
-//! Patches with many or hidden corners are divided first (`division`). What has n sides becomes n quads (`quads`); each quad is flattened by the same flow that made the cone metric, with π/2 at
-//! its four corners and nothing else (`flow`); its aspect ratio is its modulus, which cannot be chosen. The final triangulation
-//! of a quad is not that of the surface, so the surface is refined once more, and what is linear on its faces is carried over
-//! (`lift`).
+//! Patches with many or hidden corners are divided first (`division`). What has n sides becomes n quads (`quads`); each quad is flattened by
+//! the same flow that made the cone metric, with π/2 at its four corners and nothing else (`flow`); its aspect ratio is its modulus, which
+//! cannot be chosen. The two conformal maps on both sides of a wall stretch it differently: the mean of both is its parameter (`walls`),
+//! and each quad is mapped harmonically to its rectangle with the border so given (`place`). The final triangulation of a quad is not that of the
+//! surface, so the surface is refined once more, and what is linear on its faces is carried over (`lift`).
 //!
-//! *Guaranteed:* patches are injective, since a developed flat disk with straight sides and right angles is a rectangle; every
-//! side of a rectangle is a whole side of its neighbour, corner to corner, with as many samples (`counts`); corners of images
-//! hold the same points to the last bit. *Not guaranteed:* that samples along a shared side are the same points: the two sides of a wall
-//! are stretched differently by their two conformal maps. The seam samples give both coordinates of every vertex between.
-//! The log scale inside a rectangle is not bounded either.
+//! *Guaranteed:* patches are injective, as harmonic maps to convex shapes are; every side of a rectangle is a whole side of its
+//! neighbour, corner to corner, with as many samples (`counts`), and sample i of n from one corner is the same point for both, to the
+//! last bit in the images. Spline patches fitted to two images can so share the control points of their common border.
+//! *Not guaranteed:* conformal maps, though they nearly would be where both sides of every wall agreed; smoothness across walls; a bound for the
+//! log scale inside a rectangle.
 //!
 //! The tutorial shows rectangles for disks only (Fig. 10 and 18, four corners of π/2); quads by joining centres to middles are
 //! E. Catmull, J. Clark, *Recursively generated B-spline surfaces on arbitrary topological meshes* (1978).
@@ -27,14 +29,20 @@ mod disk;
 mod division;
 mod flow;
 mod glue;
+mod harmonic;
 mod lift;
+mod place;
 mod quads;
 mod sides;
 mod subdivision;
+mod walls;
+
+#[cfg(test)]
+mod tests;
 
 use crate::atlas::charts::Charts;
-use crate::atlas::cut::{CutError, CutGraph};
-use crate::atlas::develop::{DevelopError, Development};
+use crate::atlas::cut::CutGraph;
+use crate::atlas::develop::Development;
 use crate::atlas::overlay::OverlayError;
 use crate::atlas::patches::{Patch, PatchLayout, PatchParams, packed, seams};
 use crate::flow::cones::Prescription;
@@ -44,9 +52,11 @@ use crate::geometry::connectivity::ConnectivityError;
 use crate::geometry::ids::{FaceVec, PatchId};
 use crate::geometry::mesh::Mesh;
 use flow::Rectangle;
+use glue::Added;
 use quads::Quad;
 use rayon::prelude::*;
 use sides::Drawing;
+use subdivision::Subdivision;
 
 /// A surface with its flat metric, slit, developed and covered by charts.
 #[derive(Clone, Debug)]
@@ -98,17 +108,29 @@ pub enum RectangleError {
         /// What the flow said.
         error: FlowError,
     },
-    /// The sides of a developed quad are not straight.
+    /// A flattened quad is no rectangle.
     #[error(
-        "rectangle {quad} has a border vertex {bend:e} diagonals from its side, more than {bound:e}; use images.domain = \"flat\", or more cones, which make patches simpler"
+        "rectangle {quad} has opposite sides that differ by {difference:e} of its width, more than {bound:e}; use images.domain = \"flat\", or more cones, which make patches simpler"
     )]
-    NotStraight {
+    Unequal {
         /// Number of the quad.
         quad: usize,
-        /// Largest distance of a border vertex from its side, in diagonals.
-        bend: f64,
+        /// Difference of opposite sides, in widths.
+        difference: f64,
         /// What is allowed.
         bound: f64,
+    },
+    /// A map to a rectangle is not one to one.
+    #[error(
+        "rectangle {quad} has {folded} of {faces} faces turned over, since it is more crowded than float64 can tell; use images.domain = \"flat\", or more cones, which make patches simpler"
+    )]
+    Folded {
+        /// Number of the quad.
+        quad: usize,
+        /// Faces that are turned over.
+        folded: usize,
+        /// Faces of the rectangle.
+        faces: usize,
     },
     /// A system of equations could not be solved.
     #[error(transparent)]
@@ -116,12 +138,6 @@ pub enum RectangleError {
     /// A quad could not be refined.
     #[error(transparent)]
     Overlay(#[from] OverlayError),
-    /// A quad is no disk.
-    #[error(transparent)]
-    Cut(#[from] CutError),
-    /// A quad could not be developed.
-    #[error(transparent)]
-    Develop(#[from] DevelopError),
     /// The pieces do not make a surface.
     #[error(transparent)]
     Connectivity(#[from] ConnectivityError),
@@ -144,21 +160,17 @@ pub fn rectangles(
     drawing.mark_middles();
     let quads = quads::quads(&mut drawing)?;
     let samples = counts::samples(&drawing.fine, &quads, params.texel_budget);
-    let flattened: Vec<Rectangle> = quads
-        .par_iter()
-        .enumerate()
-        .map(|(i, quad)| flow::flatten(&drawing.fine, quad, i, curvature_tolerance))
-        .collect::<Result<_, _>>()?;
+    let (flattened, added) = placed(&drawing.fine, &quads, curvature_tolerance)?;
     let least =
         |value: fn(&Rectangle) -> f64| flattened.iter().map(value).fold(f64::INFINITY, f64::min);
     tracing::debug!(
         rectangles = flattened.len(),
         least_height = least(|r| r.height),
-        greatest_bend = -least(|r| -r.bend),
+        greatest_difference = -least(|r| -r.unequal),
         "patches became rectangles"
     );
     let patches = patches(&flattened, &samples, params);
-    let (fine, face_patch) = glue::glue(&drawing.fine, flattened)?;
+    let (fine, face_patch) = glue::glue(&drawing.fine, &flattened, &added)?;
     let surface = lift::lift(surface, &fine);
     let c = &fine.connectivity;
     let uv: FaceVec<[[f64; 2]; 3]> = c
@@ -174,6 +186,31 @@ pub fn rectangles(
         seams,
     };
     Ok((surface, layout))
+}
+
+/// Flattens all quads and gives them coordinates, such that both sides of a wall have the same ones along it.
+fn placed(
+    drawing: &Subdivision,
+    quads: &[Quad],
+    curvature_tolerance: f64,
+) -> Result<(Vec<Rectangle>, Added), RectangleError> {
+    // The error of the first one that has one, whichever is done first.
+    let flattened: Vec<Result<Rectangle, RectangleError>> = quads
+        .par_iter()
+        .enumerate()
+        .map(|(i, quad)| flow::flatten(drawing, quad, i, curvature_tolerance))
+        .collect();
+    let mut rectangles: Vec<Rectangle> = flattened.into_iter().collect::<Result<_, _>>()?;
+    let added = Added::new(drawing, &mut rectangles)?;
+    let borders = walls::parameters(drawing, &rectangles)?;
+    let placed: Vec<Result<(), RectangleError>> = rectangles
+        .par_iter_mut()
+        .zip(&borders)
+        .enumerate()
+        .map(|(i, (rectangle, border))| place::place(rectangle, border, i))
+        .collect();
+    placed.into_iter().collect::<Result<(), _>>()?;
+    Ok((rectangles, added))
 }
 
 /// The images: from corner to corner of the rectangles, as many samples as their sides have.
@@ -218,11 +255,7 @@ fn patches(rectangles: &[Rectangle], samples: &[[usize; 2]], params: &PatchParam
 
 impl Quad {
     /// The edges of the drawing on a side, from corner `k` on.
-    fn side(
-        &self,
-        drawing: &subdivision::Subdivision,
-        k: usize,
-    ) -> Vec<crate::geometry::ids::EdgeId> {
+    fn side(&self, drawing: &Subdivision, k: usize) -> Vec<crate::geometry::ids::EdgeId> {
         let n = self.disk.border.len();
         let (from, to) = (self.corners[k % 4], self.corners[(k + 1) % 4]);
         let count = (to + n - from) % n;

@@ -13,7 +13,7 @@
 // are there, so nothing is won, and its small faces are where the flow of a quad ran out of digits.
 
 use super::RectangleError;
-use super::chord::{Crossing, aim, harmonic, zero_level};
+use super::chord::{Crossing, aim, zero_level};
 use super::disk::Disk;
 use super::division::{cross, draw, joining, part, places, regions};
 use super::sides::{Drawing, Role};
@@ -86,7 +86,7 @@ fn slit_to_centre(drawing: &mut Drawing, disk: &Disk) -> Result<(), RectangleErr
         .map(|i| between(middles[i], middles[(i + 1) % sides]))
         .collect();
     given.push(between(middles[0], opposite));
-    let mut measures = harmonic(&drawing.fine, disk, &given)?;
+    let mut measures = disk.harmonic(&drawing.fine, &given)?;
     let ahead = measures.pop().ok_or_else(error)?;
     let log = |x: f64| x.max(f64::MIN_POSITIVE).ln();
     let score = |measure: &dyn Fn(&VertexVec<f64>) -> f64| -> f64 {
@@ -158,7 +158,7 @@ fn halve(drawing: &mut Drawing, disk: Disk) -> Result<Option<[FaceId; 2]>, Recta
         _ => portion(quads - before),
     };
     let given: Vec<f64> = (0..n).map(value).collect();
-    let mut solved = harmonic(&drawing.fine, &disk, &[given])?;
+    let mut solved = disk.harmonic(&drawing.fine, &[given])?;
     let mut value = solved.pop().ok_or_else(error)?;
     let length = disk.lengths(&drawing.fine);
     aim(&disk, &length, &mut value, to, [1.0, -1.0]);

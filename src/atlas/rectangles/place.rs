@@ -1,0 +1,97 @@
+//! Where the vertices of a rectangle lie, when it is known where those on its border do.
+//!
+//! *Enters:* a rectangle, and the fractions of its sides at which its border vertices are to lie. *Leaves:* coordinates in
+//! [0, 1] × [0, height], linear on its faces. *Guaranteed:* border vertices lie where they are to, to the last bit, corners on corners; the
+//! map is one to one up to rounding (see [`harmonic`](super::harmonic)): a harmonic map of a disk to a convex one.
+//!
+//! The flow's own map of a quad to its rectangle is conformal, and so harmonic. With other values on the border the harmonic map is no
+//! longer conformal, but differs from it smoothly; where nothing moves they are nearly the same (weights of edges that the border cut are
+//! raised). It is computed on the flow's flat triangulation, whose faces are well shaped, and linear on these; so slivers never decide about it.
+
+// Blending the four side maps across the rectangle needs no equations, but it folds: near a crowded corner one side map may rise like
+// t^{1/9} and another one not. It flipped faces in 7 to 24 % of the rectangles of seven models, where harmonic maps flipped none.
+
+use super::RectangleError;
+use super::flow::Rectangle;
+use super::harmonic::harmonic;
+use super::walls::Fractions;
+use crate::atlas::plane::{distance, doubled_area};
+use crate::geometry::ids::{HalfedgeId, VertexVec};
+
+/// What rounding moves a corner by, at most, in widths of the rectangle.
+const ROUNDING: f64 = 1e-15;
+
+/// Sets the coordinates of all corners. `border` says for every piece of the border which side it lies on, and the fractions where
+/// it begins; `number` is that of the quad, for errors.
+pub(super) fn place(
+    rectangle: &mut Rectangle,
+    border: &[(usize, Fractions)],
+    number: usize,
+) -> Result<(), RectangleError> {
+    let c = &rectangle.fine.connectivity;
+    let mut at: VertexVec<Option<[f64; 2]>> = VertexVec::filled(None, c.vertex_count());
+    for (piece, &(side, fractions)) in rectangle.border.iter().zip(border) {
+        let tail = c.tail(c.edge_halfedge(piece.edge));
+        let side = (side + 4 - rectangle.origin) % 4;
+        at[tail] = Some(on_side(side, fractions, rectangle.height));
+    }
+    let error = || RectangleError::Inconsistent {
+        what: "the border of a quad",
+    };
+    let flat = &rectangle.layout.connectivity;
+    let loops = flat.boundary_loops();
+    let [border] = &loops[..] else {
+        return Err(error());
+    };
+    let given: Vec<[f64; 2]> = border
+        .iter()
+        .map(|&h| at[flat.tail(h)].ok_or_else(error))
+        .collect::<Result<_, _>>()?;
+    let given = [0, 1].map(|i| given.iter().map(|p| p[i]).collect::<Vec<f64>>());
+    let solved = harmonic(flat, &rectangle.layout.length, border, &given)?;
+    let most = [1.0, rectangle.height];
+    let carried = |h: HalfedgeId| {
+        let v = flat.tail(h);
+        // The maximum principle, whatever the rounding.
+        std::array::from_fn(|i| solved[i][v].clamp(0.0, most[i]))
+    };
+    for (v, &carrier) in rectangle.carrier.enumerate() {
+        at[v].get_or_insert_with(|| carrier.place(flat, carried));
+    }
+    let mut folded = 0;
+    for f in c.faces() {
+        let mut uv = [[0.0; 2]; 3];
+        for (uv, v) in uv.iter_mut().zip(c.face_vertices(f)) {
+            *uv = at[v].ok_or_else(error)?;
+        }
+        for (h, uv) in c.face_halfedges(f).into_iter().zip(uv) {
+            rectangle.fine.corner[h].uv = uv;
+        }
+        folded += usize::from(is_folded(uv));
+    }
+    match folded {
+        0 => Ok(()),
+        _ => Err(RectangleError::Folded {
+            quad: number,
+            folded,
+            faces: c.face_count(),
+        }),
+    }
+}
+
+/// Whether a face is turned over by more than the rounding of its corners, which lie in the unit square.
+fn is_folded(t: [[f64; 2]; 3]) -> bool {
+    let longest = [0, 1, 2].map(|k| distance(t[k], t[(k + 1) % 3]));
+    let longest = longest.into_iter().fold(0.0, f64::max);
+    doubled_area(t) < -ROUNDING * longest
+}
+
+/// A point on a side, counterclockwise from the origin on.
+fn on_side(side: usize, [before, behind]: Fractions, height: f64) -> [f64; 2] {
+    match side {
+        0 => [before, 0.0],
+        1 => [1.0, before * height],
+        2 => [behind, height],
+        _ => [0.0, behind * height],
+    }
+}
