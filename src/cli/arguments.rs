@@ -142,8 +142,8 @@ Examples:
   affine-atlas fit affine-atlas-out/bunny
   affine-atlas fit affine-atlas-out/bunny -o bunny-splines --spacing 2 --against bunny.obj
 
-Fits one bicubic B-spline surface to the image of every rectangle; neighbours share the control points of their
-sides, so that there are no gaps. The new folder holds
+Fits one bicubic B-spline surface to the image of every rectangle. Neighbours share the control
+points of their sides, so that there are no gaps. The new folder holds
   NAME.xml   a MultiPatch with interfaces and boundary, as G+Smo reads it (one a component)
   fit.json   errors of every patch and of every shared side
 It appears when it is complete.";

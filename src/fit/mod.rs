@@ -277,8 +277,8 @@ fn inside(grid: &Grid, border: &[Vec<[f64; 3]>; 4], fitters: &Fitters) -> BSplin
     for i in 1..size[0] - 1 {
         let column: Vec<[f64; 3]> = fitted.iter().map(|row| row[i]).collect();
         let control = by_v.fit(&column, nothing);
-        for k in 1..size[1] - 1 {
-            surface.control[k * size[0] + i] = control[k];
+        for (k, &point) in control.iter().enumerate().take(size[1] - 1).skip(1) {
+            surface.control[k * size[0] + i] = point;
         }
     }
     surface

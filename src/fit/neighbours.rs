@@ -98,14 +98,14 @@ pub fn neighbours(lattices: &[Lattice], seams: &[Seam]) -> Result<Neighbours, Fi
     }
     let mut sets = UnionFind::new(4 * lattices.len());
     let (mut interfaces, mut boundary) = (Vec::new(), Vec::new());
-    for patch in 0..lattices.len() {
-        for side in Side::ALL {
+    for (patch, sides) in found.iter().enumerate() {
+        for (side, &found) in Side::ALL.into_iter().zip(sides) {
             let own = PatchSide { patch, side };
             let Found {
                 across,
                 covered,
                 way,
-            } = found[patch][side as usize];
+            } = found;
             let whole = |x: f64| (x.abs() - 1.0).abs() <= SIDE_TOLERANCE;
             let across = across.ok_or(FitError::NoSeam { side: own })?;
             if across == Some(own) {

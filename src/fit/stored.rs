@@ -70,7 +70,7 @@ fn grid(patch: usize, image: &StoredImage, origin: [f64; 3]) -> Result<Grid, Fit
             && near(upright[i][0], low[i])
             && near(upright[i][1], high[i])
     });
-    if !is_rectangle || !(high[0] > 0.0 && high[1] > 0.0) {
+    if !(is_rectangle && high[0] > 0.0 && high[1] > 0.0) {
         return Err(FitError::Lattice {
             patch,
             corners: [low, high],
