@@ -9,6 +9,7 @@ use affine_atlas::config::Config;
 use affine_atlas::config::assets::Asset;
 use affine_atlas::export::folder::remove_all_staging;
 use affine_atlas::export::manifest::{Manifest, Record};
+use affine_atlas::job::fit::FitParams;
 use affine_atlas::job::rebuild::RebuildAssetError;
 use affine_atlas::job::survey::folder_name as survey_folder;
 use affine_atlas::job::{self, BuildError};
@@ -17,8 +18,8 @@ use affine_atlas::outcome::{AssetOutcome, Failure, FailureKind};
 use affine_atlas::read::{self, ReadParams};
 use affine_atlas::verify::{self, SourceSurface, VerifyOptions};
 use cli::work::{
-    Inspection, RebuildRequest, RebuildResult, SurveyRequest, Surveyed, VerifyRequest,
-    VerifyResult, Work,
+    FitRequest, FitResult, Inspection, RebuildRequest, RebuildResult, SurveyRequest, Surveyed,
+    VerifyRequest, VerifyResult, Work,
 };
 use std::path::Path;
 use std::process::ExitCode;
@@ -32,6 +33,7 @@ const WORK: Work = Work {
     survey_folder,
     verify,
     rebuild,
+    fit,
     remove_staging: remove_all_staging,
 };
 
@@ -130,5 +132,19 @@ fn rebuild(request: &RebuildRequest) -> Result<RebuildResult, Failure> {
         glb: glb.map_err(|error| Failure::from(&RebuildAssetError::from(error)))?,
         text: asset.to_string(),
         json: asset.json(),
+    })
+}
+
+fn fit(request: &FitRequest) -> Result<FitResult, Failure> {
+    let params = FitParams {
+        spacing: request.spacing,
+        against: request.against.clone(),
+    };
+    let fitted = job::fit::fit(&request.folder, &params).map_err(|error| Failure::from(&error))?;
+    let written = fitted.write(&request.root, &request.name);
+    written.map_err(|error| Failure::from(&error))?;
+    Ok(FitResult {
+        text: fitted.to_string(),
+        json: fitted.json(),
     })
 }

@@ -334,6 +334,26 @@ fn rebuild_without_a_folder_or_a_glb() {
 }
 
 #[test]
+fn fit_without_a_folder_or_a_name() {
+    let folder = folder();
+    insta::assert_snapshot!(refusal(folder.path(), &["fit", "nowhere"], 2), @r"
+    error: there is no folder nowhere
+    help: name a folder that `affine-atlas build` wrote
+    ");
+    insta::assert_snapshot!(refusal(folder.path(), &["fit", ".", "-o", ".."], 2), @r"
+    error: .. does not end in the name of a folder to write
+    help: name it with `--out FOLDER`
+    ");
+    insta::assert_snapshot!(refusal(folder.path(), &["fit", ".", "--spacing", "1.5"], 2), @r"
+    error: invalid value '1.5' for '--spacing <STEPS>': it must be a number from 2 on
+
+    For more information, try '--help'.
+    ");
+    std::fs::create_dir(folder.path().join("empty")).expect("created");
+    insta::assert_snapshot!(refusal(folder.path(), &["fit", "empty"], 1), @"failed: empty (input): empty holds no atlas.json and no component-000; give the folder that `affine-atlas build` wrote for a mesh");
+}
+
+#[test]
 fn wrong_arguments_exit_with_2_and_help_with_0() {
     let folder = folder();
     for arguments in [
@@ -343,6 +363,8 @@ fn wrong_arguments_exit_with_2_and_help_with_0() {
         &["build", "--threads", "1025"],
         &["verify"],
         &["rebuild", "."],
+        &["fit"],
+        &["fit", ".", "--spacing", "nan"],
         &["build", "-q", "-v"],
     ] {
         assert_eq!(
@@ -379,6 +401,7 @@ fn help() {
       cones    Show what more or fewer cones gain, and write lists of them
       verify   Read atlases back and check every property they must have
       rebuild  Make a mesh again from the geometry images of an atlas
+      fit      Fit spline surfaces to the images of rectangles
       init     Write a configuration file that explains every key
       help     Print this message or the help of the given subcommand(s)
 
@@ -710,7 +733,7 @@ fn a_survey_keeps_what_is_not_its_own() {
         &["cones", "tetra.obj", "--out", "out", "--quiet"],
         1,
     );
-    insta::assert_snapshot!(text, @"failed: tetra (output): out/tetra.cones exists and holds no earlier atlas, so it is not replaced; move it away or choose another output folder");
+    insta::assert_snapshot!(text, @"failed: tetra (output): out/tetra.cones exists and holds nothing that this command wrote earlier, so it is not replaced; move it away or choose another output folder");
     assert!(place.join("notes.txt").exists());
     // Nor an input that lies in an older folder of ours.
     std::fs::write(place.join("cones.json"), "{}").expect("written");

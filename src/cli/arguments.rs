@@ -1,5 +1,6 @@
 //! Arguments and their help texts.
 
+use affine_atlas::fit::{DEFAULT_SPACING, LEAST_SPACING};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -76,6 +77,9 @@ pub enum Command {
     /// Make a mesh again from the geometry images of an atlas
     #[command(after_help = REBUILD_EXAMPLES, after_long_help = REBUILD_EXAMPLES)]
     Rebuild(Rebuild),
+    /// Fit spline surfaces to the images of rectangles
+    #[command(after_help = FIT_EXAMPLES, after_long_help = FIT_EXAMPLES)]
+    Fit(Fit),
     /// Write a configuration file that explains every key
     #[command(after_help = INIT_EXAMPLES, after_long_help = INIT_EXAMPLES)]
     Init(Init),
@@ -131,6 +135,18 @@ Uses the images, atlas.json and the seam samples of atlas.npz, and nothing else 
 watertight where the surface is: patches share the vertices of their seams. With --against it says how far the
 mesh is from that one: PSNR = 20 log10(diagonal / RMS distance), Hausdorff distance over 200,000 samples and all
 vertices of each, and angles between normals.";
+
+const FIT_EXAMPLES: &str = "\
+Examples:
+  affine-atlas build bunny.obj --set images.domain=rectangle
+  affine-atlas fit affine-atlas-out/bunny
+  affine-atlas fit affine-atlas-out/bunny -o bunny-splines --spacing 2 --against bunny.obj
+
+Fits one bicubic B-spline surface to the image of every rectangle. Neighbours share the control
+points of their sides, so that there are no gaps. The new folder holds
+  NAME.xml   a MultiPatch with interfaces and boundary, as G+Smo reads it (one a component)
+  fit.json   errors of every patch and of every shared side
+It appears when it is complete.";
 
 const INIT_EXAMPLES: &str = "\
 Examples:
@@ -213,6 +229,34 @@ pub struct Rebuild {
     /// Write JSON instead of text
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct Fit {
+    /// Folder that `build` wrote for a mesh with images.domain = "rectangle"
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// Folder to write, replacing an older one [default: DIR.fit]
+    #[arg(short, long, value_name = "FOLDER")]
+    pub out: Option<PathBuf>,
+    /// Sample steps that a knot interval takes, at least 2: fewer give more control points
+    #[arg(long, value_name = "STEPS", default_value_t = DEFAULT_SPACING, value_parser = spacing)]
+    pub spacing: f64,
+    /// Measure the distance from this mesh instead of the atlas's own surface
+    #[arg(long, value_name = "MESH")]
+    pub against: Option<PathBuf>,
+    /// Write JSON instead of text
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A number from the least spacing on.
+fn spacing(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok();
+    let good = |x: &f64| x.is_finite() && *x >= LEAST_SPACING;
+    number
+        .filter(good)
+        .ok_or_else(|| format!("it must be a number from {LEAST_SPACING} on"))
 }
 
 #[derive(Debug, Args)]

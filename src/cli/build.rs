@@ -148,6 +148,12 @@ mod tests {
                 message: String::new(),
             })
         },
+        fit: |_| {
+            Err(Failure {
+                kind: FailureKind::Input,
+                message: String::new(),
+            })
+        },
         remove_staging: || {},
     };
 

@@ -4,6 +4,7 @@ mod arguments;
 mod build;
 mod check;
 mod cones;
+mod fit;
 mod init;
 mod interrupt;
 mod log;
@@ -69,6 +70,7 @@ fn run(arguments: &Arguments, work: &Work) -> Result<u8, Problem> {
         Command::Cones(cones) => cones::run(cones, global, work),
         Command::Verify(verify) => verify::run(verify, global, work),
         Command::Rebuild(rebuild) => rebuild::run(rebuild, global, work),
+        Command::Fit(fit) => fit::run(fit, global, work),
         Command::Init(init) => init::run(init, global),
     }
 }

@@ -32,6 +32,8 @@ pub enum Problem {
     NotRecorded { path: PathBuf, reason: String },
     #[error("{} does not end in .glb, the only format that meshes are written in", path.display())]
     NotGlb { path: PathBuf },
+    #[error("{} does not end in the name of a folder to write", path.display())]
+    NoName { path: PathBuf },
     #[error("there is no folder {}", path.display())]
     NoFolder { path: PathBuf },
     #[error("the {given} threads of this run cannot be started: {reason}")]
@@ -66,6 +68,7 @@ impl Problem {
                 "check that its folder exists, may be written and has space left"
             }
             Self::NotGlb { .. } => "name the file with `--out MESH.glb`",
+            Self::NoName { .. } => "name it with `--out FOLDER`",
             Self::NoFolder { .. } => "name a folder that `affine-atlas build` wrote",
             Self::Threads { .. } => "ask for fewer with `--threads`",
             Self::Internal(_) => return None,

@@ -23,6 +23,8 @@ pub struct Work {
     pub verify: fn(&VerifyRequest) -> Result<VerifyResult, Failure>,
     /// Makes a mesh again from an asset's folder.
     pub rebuild: fn(&RebuildRequest) -> Result<RebuildResult, Failure>,
+    /// Fits spline surfaces to an asset's folder and writes them into another.
+    pub fit: fn(&FitRequest) -> Result<FitResult, Failure>,
     /// Removes folders that are being written. Called once before the program is stopped.
     pub remove_staging: fn(),
 }
@@ -87,6 +89,28 @@ pub struct RebuildRequest {
     pub folder: PathBuf,
     /// A mesh to compare with.
     pub against: Option<PathBuf>,
+}
+
+/// What `fit` is asked for.
+pub struct FitRequest {
+    /// An asset's folder.
+    pub folder: PathBuf,
+    /// Folder that holds the folder to write.
+    pub root: PathBuf,
+    /// Name of the folder to write.
+    pub name: String,
+    /// Sample steps a knot interval.
+    pub spacing: f64,
+    /// A mesh to measure against.
+    pub against: Option<PathBuf>,
+}
+
+/// What `fit` found.
+pub struct FitResult {
+    /// Figures: lines for a reader.
+    pub text: String,
+    /// The same for programs.
+    pub json: serde_json::Value,
 }
 
 /// What `rebuild` made.

@@ -67,7 +67,7 @@ pub enum ExportError {
     },
     /// A folder that this program did not write stands where the asset's folder would go.
     #[error(
-        "{} exists and holds no earlier atlas, so it is not replaced; move it away or choose another output folder", path.display()
+        "{} exists and holds nothing that this command wrote earlier, so it is not replaced; move it away or choose another output folder", path.display()
     )]
     ForeignFolder {
         /// Where the folder would go.

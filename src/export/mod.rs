@@ -14,6 +14,7 @@ pub mod atlas_json;
 mod error;
 pub mod exr;
 pub mod folder;
+pub mod gismo;
 pub mod glb;
 pub mod manifest;
 pub mod npz;

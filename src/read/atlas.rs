@@ -1,7 +1,8 @@
 //! Images and seams of one component's folder: what a reader of geometry images uses, and no more.
 //!
 //! *Enters:* a folder that a build wrote. *Leaves:* an [`ImageFolder`]: positions and masks of the images, the seam arrays
-//! of `atlas.npz`, and from `atlas.json` where the texels lie and the topology that is stated.
+//! of `atlas.npz`, and from `atlas.json` where the texels lie and the topology that is stated; and, for those who measure against
+//! it, a [`StoredSurface`].
 //!
 //! *Guaranteed:* nothing panics whatever the files hold, and memory is bounded by what they hold; images have the size that is stated; the
 //! arrays of seams have lengths that fit each other.
@@ -143,6 +144,15 @@ pub struct StoredImage {
     pub alpha: Vec<f32>,
 }
 
+/// The surface that an atlas is defined on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StoredSurface {
+    /// Source units.
+    pub positions: Vec<[f64; 3]>,
+    /// Counterclockwise; vertices are in range.
+    pub faces: Vec<[u32; 3]>,
+}
+
 /// Everything that a mesh is rebuilt from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImageFolder {
@@ -264,6 +274,37 @@ pub fn read_images(folder: &Path) -> Result<ImageFolder, FolderError> {
         seam_uv,
         seam_patch,
         topology: document.topology,
+    })
+}
+
+/// Reads the surface of one component from `atlas.npz`.
+///
+/// # Errors
+/// A file that is missing or damaged, positions that are not finite, and faces of vertices that are not there.
+pub fn read_surface(folder: &Path) -> Result<StoredSurface, FolderError> {
+    let path = folder.join("atlas.npz");
+    let read = || -> Result<_, String> {
+        let mut npz = Npz::open(&path)?;
+        let (positions, vertices) = npz.read::<f64>("positions", &[None, Some(3)])?;
+        let (faces, _) = npz.read::<u32>("faces", &[None, Some(3)])?;
+        if let Some(at) = positions.iter().position(|x| !x.is_finite()) {
+            let (row, value) = (at / 3, positions[at]);
+            return Err(format!("row {row} of positions holds {value}"));
+        }
+        if let Some(at) = faces.iter().position(|&v| v as usize >= vertices) {
+            let (row, vertex) = (at / 3, faces[at]);
+            return Err(format!(
+                "row {row} of faces names vertex {vertex} of {vertices}"
+            ));
+        }
+        Ok(StoredSurface {
+            positions: positions.as_chunks::<3>().0.to_vec(),
+            faces: faces.as_chunks::<3>().0.to_vec(),
+        })
+    };
+    read().map_err(|problem| FolderError::File {
+        path: path.clone(),
+        problem,
     })
 }
 

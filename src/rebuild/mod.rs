@@ -33,7 +33,7 @@ mod thin;
 mod tests;
 
 pub use error::RebuildError;
-pub use stored::rebuild_stored;
+pub use stored::{rebuild_stored, stored_seams};
 
 use crate::atlas::geometry_image::GeometryImage;
 use crate::atlas::patches::{PatchLayout, Seam};

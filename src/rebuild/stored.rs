@@ -5,12 +5,12 @@ use crate::atlas::patches::{Domain, Seam, SeamSample};
 use crate::geometry::ids::PatchId;
 use crate::read::atlas::{BOUNDARY, ImageFolder, StatedTopology};
 
-/// Rebuilds the mesh of a folder and compares its topology with the one that is stated there.
+/// The seams of a folder.
 ///
 /// # Errors
-/// As [`super::rebuild`], and another topology.
-pub fn rebuild_stored(folder: &ImageFolder) -> Result<Rebuilt, RebuildError> {
-    let seams = folder
+/// A seam of a patch that is not there.
+pub fn stored_seams(folder: &ImageFolder) -> Result<Vec<Seam>, RebuildError> {
+    folder
         .seam_patch
         .iter()
         .zip(folder.seam_offset.windows(2))
@@ -42,7 +42,15 @@ pub fn rebuild_stored(folder: &ImageFolder) -> Result<Rebuilt, RebuildError> {
                     .collect(),
             })
         })
-        .collect::<Result<Vec<Seam>, _>>()?;
+        .collect::<Result<Vec<Seam>, _>>()
+}
+
+/// Rebuilds the mesh of a folder and compares its topology with the one that is stated there.
+///
+/// # Errors
+/// As [`super::rebuild`], and another topology.
+pub fn rebuild_stored(folder: &ImageFolder) -> Result<Rebuilt, RebuildError> {
+    let seams = stored_seams(folder)?;
     let images = Images {
         patches: folder
             .images

@@ -4,6 +4,7 @@ mod arrays;
 mod boundaries;
 mod command;
 mod existence;
+mod fit;
 mod flows;
 mod good;
 #[cfg(unix)]

@@ -87,6 +87,8 @@ pub enum Contents {
     Atlas,
     /// A survey of cones.
     Cones,
+    /// Spline surfaces.
+    Fit,
 }
 
 impl Contents {
@@ -97,6 +99,7 @@ impl Contents {
                 name == "atlas.json" || name.to_string_lossy().starts_with("component-")
             }
             Contents::Cones => name == "cones.json",
+            Contents::Fit => name == "fit.json",
         }
     }
 }

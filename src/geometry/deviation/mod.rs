@@ -119,17 +119,8 @@ fn one_sided(
         0 => Vec::new(),
         _ => surface.positions.iter().copied().step_by(step).collect(),
     };
-    let vertices = tested.par_chunks(RUN).map(|points| {
-        let mut near = 0;
-        let distances = points.iter().map(|&p| {
-            let nearest = other.nearest(p, near);
-            near = nearest.face;
-            nearest.distance
-        });
-        distances.fold(0.0, f64::max)
-    });
     let mut sum = OneSided {
-        farthest: vertices.reduce(|| 0.0, f64::max),
+        farthest: from_tree(&tested, other).into_iter().fold(0.0, f64::max),
         ..OneSided::default()
     };
     for run in runs {
@@ -139,6 +130,23 @@ fn one_sided(
         sum.largest_angle = sum.largest_angle.max(run.largest_angle);
     }
     Some((total, sum))
+}
+
+/// Distance of each point from a surface; `None` where that has no faces. Quick where points that follow each other are near each other.
+pub fn distances(points: &[[f64; 3]], surface: Triangles<'_>) -> Option<Vec<f64>> {
+    Some(from_tree(points, &BoxTree::new(surface)?))
+}
+
+fn from_tree(points: &[[f64; 3]], tree: &BoxTree) -> Vec<f64> {
+    let runs = points.par_chunks(RUN).flat_map_iter(|run| {
+        let mut near = 0;
+        run.iter().map(move |&p| {
+            let nearest = tree.nearest(p, near);
+            near = nearest.face;
+            nearest.distance
+        })
+    });
+    runs.collect()
 }
 
 fn corners(surface: Triangles<'_>, face: [u32; 3]) -> [[f64; 3]; 3] {
@@ -190,7 +198,7 @@ fn normal(t: [[f64; 3]; 3]) -> [f64; 3] {
 }
 
 /// Angle between two directions; 0 where one has no length.
-fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub(crate) fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
     let dot: f64 = a.iter().zip(b).map(|(x, y)| x * y).sum();
     norm(cross(a, b)).atan2(dot)
 }
