@@ -47,6 +47,10 @@ use std::f64::consts::TAU;
 
 /// Share of the least variance of the log scale that counts as hardly more: a quarter of the standard deviation.
 const NEAR_COST: f64 = 0.6;
+/// Looks at the log scale that the mesh really has, at most …
+const SETTLES: usize = 4;
+/// … each of which must gain this share of the cost for another to follow.
+const SETTLED: f64 = 1e-2;
 /// Curvatures in excess of a limit that are rounding, radians.
 const ROUNDING: f64 = 1e-9;
 
@@ -239,8 +243,8 @@ impl Search<'_> {
         found
     }
 
-    /// One more look, with the log scale that the mesh really has in place of that of the linear picture: places and curvatures are improved
-    /// near where they are, and kept where the mesh agrees that they are better.
+    /// Another look, with the log scale that the mesh really has in place of that of the linear picture: places and curvatures are improved
+    /// near where they are, and kept where the mesh agrees that they are better; once more as long as that gains.
     fn settle(&self, placement: &mut Placement, choice: Choice, found: Found, rule: Rule) -> Found {
         let objective = self.cones.objective;
         let cost = |placement: &Placement, u: &[f64]| match objective {
@@ -263,26 +267,41 @@ impl Search<'_> {
                 }
             }
         }
-        let (vertices, curvature) = (&found.vertices, &found.curvature);
-        placement.correct(vertices, curvature, &real);
-        let mut moved = match objective {
-            ConeObjective::LogScale => match placement.settle(choice) {
-                Some(choice) => Found {
-                    vertices: choice.vertices(),
-                    curvature: choice.best.curvature,
-                    cost: now,
-                    distortion: 0.0,
-                },
-                None => return found,
-            },
-            ConeObjective::AreaDistortion => {
-                let start = placement.arrangement(vertices, curvature, rule);
-                placement.near(self.mesh, start, rule, FINE).found()
+        let mut choice = choice;
+        for _ in 0..SETTLES {
+            let (vertices, curvature) = (&found.vertices, &found.curvature);
+            placement.correct(vertices, curvature, &real);
+            let mut moved = match objective {
+                ConeObjective::LogScale => {
+                    let Some(settled) = placement.settle(choice) else {
+                        break;
+                    };
+                    choice = settled;
+                    Found {
+                        vertices: choice.vertices(),
+                        curvature: choice.best.curvature.clone(),
+                        cost: now,
+                        distortion: 0.0,
+                    }
+                }
+                ConeObjective::AreaDistortion => {
+                    let start = placement.arrangement(vertices, curvature, rule);
+                    placement.near(self.mesh, start, rule, FINE).found()
+                }
+            };
+            real = placement.real_log_scale(&moved.vertices, &moved.curvature);
+            moved.cost = cost(placement, &real);
+            if moved.cost >= now {
+                break;
             }
-        };
-        let next = placement.real_log_scale(&moved.vertices, &moved.curvature);
-        moved.cost = cost(placement, &next);
-        if moved.cost < now { moved } else { found }
+            let goal = now * (1.0 - SETTLED);
+            now = moved.cost;
+            found = moved;
+            if now > goal {
+                break;
+            }
+        }
+        found
     }
 }
 

@@ -25,6 +25,8 @@ use std::sync::Arc;
 const KNOWN: usize = 1 << 25;
 /// Vertices that are looked at everywhere; from the best of them the search climbs to a vertex that is better than its neighbours.
 const SAMPLES: usize = 2000;
+/// Vertices to climb from where every step takes the best curvatures of all cones.
+const CLIMBS: usize = 3;
 /// Samples whose worth is told side by side.
 const PIECE: usize = 256;
 
@@ -256,8 +258,8 @@ impl<'a> Placement<'a> {
 
     /// Vertices that are worth most beside `choice`, and the variance that each promises at the least; near a vertex, or anywhere.
     ///
-    /// Where curvatures are at a limit, two are named: one for cones that stay there, and one for cones that need not, because the new one
-    /// relieves them. The second matters most where too few cones must make up the total and all are at their limits.
+    /// Where curvatures are at a limit, the search begins at places for cones that stay there, and at places for cones that need not, because
+    /// the new one relieves them. The second matter most where too few cones must make up the total and all are at their limits.
     pub(super) fn best_additions(&self, choice: &Choice, from: Option<usize>) -> Vec<(usize, f64)> {
         self.additions(choice, from, 1)
     }
@@ -269,23 +271,52 @@ impl<'a> Placement<'a> {
         from: Option<usize>,
         most: usize,
     ) -> Vec<(usize, f64)> {
-        let mut found: Vec<(usize, f64)> = Vec::new();
-        if choice.best.is_inside.iter().any(|inside| !inside) {
-            let unlimited = Limits {
-                range: [f64::NEG_INFINITY, f64::INFINITY],
-                ..self.limits
+        let others = || {
+            let found = self.beside(&choice.sites, &choice.best, from);
+            found.unwrap_or_default()
+        };
+        let mut found = if choice.best.is_inside.iter().all(|inside| *inside) {
+            others()
+        } else {
+            let starts: Vec<usize> = match from {
+                Some(vertex) => vec![vertex],
+                None => {
+                    let unlimited = Limits {
+                        range: [f64::NEG_INFINITY, f64::INFINITY],
+                        ..self.limits
+                    };
+                    let relieved = self.program(&choice.sites).minimise(unlimited);
+                    let relieved =
+                        relieved.and_then(|best| self.beside(&choice.sites, &best, from));
+                    let both = relieved.into_iter().flatten().chain(others());
+                    both.map(|found| found.0).collect()
+                }
             };
-            let relieved = self.program(&choice.sites).minimise(unlimited);
-            let relieved = relieved.and_then(|best| self.beside(&choice.sites, &best, from));
-            found.extend(relieved.unwrap_or_default().into_iter().take(most));
-        }
-        let others = self.beside(&choice.sites, &choice.best, from);
-        for other in others.unwrap_or_default().into_iter().take(most) {
-            if found.iter().all(|one| one.0 != other.0) {
-                found.push(other);
-            }
-        }
+            self.within_limits(&choice.sites, &starts)
+        };
+        found.truncate(most);
         found
+    }
+
+    /// Vertices that are worth most beside `sites`, uphill from some, the best first, and the variance with each. Promises are too low where
+    /// curvatures are at their limits, so here the best curvatures of all are found for every vertex that is looked at.
+    fn within_limits(&self, sites: &[Site], from: &[usize]) -> Vec<(usize, f64)> {
+        let known = self.program(sites);
+        let gain = |v: usize, row: &mut Vec<f64>| -> f64 {
+            row.clear();
+            row.extend(sites.iter().map(|s| s.column[v]));
+            let with = known.with_one_more(row, self.self_energy[v], self.slope[v]);
+            let best = with.minimise(self.limits);
+            best.map_or(f64::NEG_INFINITY, |best| -best.energy)
+        };
+        let taken = |v: usize| !self.allowed[v] || sites.iter().any(|s| s.vertex == v);
+        let mut row = Vec::new();
+        let mut starts: Vec<(usize, f64)> = from.iter().map(|&v| (v, gain(v, &mut row))).collect();
+        // Stable: of equals the first.
+        starts.sort_by(|a, b| b.1.total_cmp(&a.1));
+        starts.truncate(CLIMBS);
+        let tops = self.climb(starts.into_iter(), taken, gain).into_iter();
+        tops.map(|(v, gain)| (v, self.base_energy - gain)).collect()
     }
 
     /// Vertices that are worth most beside cones of given curvatures, the best first, and the variance that each promises.

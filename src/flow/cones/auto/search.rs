@@ -150,10 +150,15 @@ impl Placement<'_> {
         let count = choice.sites.len();
         let many = self.grow(choice.clone(), count + more);
         let many = self.exchange(many, COARSE_GAIN, false);
-        let Some(fewer) = self.prune(many, count) else {
-            return choice;
-        };
-        let other = self.exchange(fewer, COARSE_GAIN, false);
+        let mut other = many;
+        // Never less than half of them at once, and all others in their places before the next leave.
+        while other.sites.len() > count {
+            let fewer = count.max(other.sites.len().div_ceil(2));
+            let Some(fewer) = self.prune(other, fewer) else {
+                return choice;
+            };
+            other = self.exchange(fewer, COARSE_GAIN, false);
+        }
         // Ways that end at the same places differ by rounding.
         match other.energy < choice.energy * (1.0 - ROUNDING) {
             true => other,
