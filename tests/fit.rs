@@ -95,7 +95,7 @@ fn joined(model: &Path, euler: i64) -> Result<(), Failed> {
     }
 }
 
-/// SciPy fits each image for itself with the same knots, and so gets the least that can be: ours may be no nearer. It reads
+/// SciPy fits each image for itself with the same knots, and so gets the least that can be: ours may be no nearer, and not much farther. It reads
 /// the images as they are, so they are grids without holes.
 fn beside_scipy() -> Result<(), Failed> {
     let folder = tempfile::tempdir()?;
@@ -133,10 +133,11 @@ fn beside_scipy() -> Result<(), Failed> {
         least += count * rms * rms;
     }
     let root = |x: f64| (x / samples).sqrt() / component.measured.diagonal;
-    println!(
-        "RMS {:.3e} of the diagonal, SciPy {:.3e}",
-        root(squares),
-        root(least)
-    );
-    Ok(())
+    let [ours, least] = [squares, least].map(root);
+    println!("RMS {ours:.3e} of the diagonal, SciPy {least:.3e}");
+    // Shared corners and sides cost little, as both images have the same points there.
+    match ours <= 1.1 * least {
+        true => Ok(()),
+        false => Err(format!("RMS {ours:e}, but SciPy {least:e}").into()),
+    }
 }

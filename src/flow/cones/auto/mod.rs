@@ -47,10 +47,8 @@ use std::f64::consts::TAU;
 
 /// Share of the least variance of the log scale that counts as hardly more: a quarter of the standard deviation.
 const NEAR_COST: f64 = 0.6;
-/// Looks at the log scale that the mesh really has, at most …
-const SETTLES: usize = 4;
-/// … each of which must gain this share of the cost for another to follow.
-const SETTLED: f64 = 1e-2;
+/// Share of the real cost by which the linear picture may be wrong before it is corrected.
+const AS_PROMISED: f64 = 0.02;
 /// Curvatures in excess of a limit that are rounding, radians.
 const ROUNDING: f64 = 1e-9;
 
@@ -243,8 +241,8 @@ impl Search<'_> {
         found
     }
 
-    /// Another look, with the log scale that the mesh really has in place of that of the linear picture: places and curvatures are improved
-    /// near where they are, and kept where the mesh agrees that they are better; once more as long as that gains.
+    /// Another look, with the log scale that the mesh really has in place of that of the linear picture: where that promised something else,
+    /// places and curvatures are improved near where they are, and kept if the mesh agrees that they are better.
     fn settle(&self, placement: &mut Placement, choice: Choice, found: Found, rule: Rule) -> Found {
         let objective = self.cones.objective;
         let cost = |placement: &Placement, u: &[f64]| match objective {
@@ -254,6 +252,9 @@ impl Search<'_> {
         let mut found = found;
         let mut real = placement.real_log_scale(&found.vertices, &found.curvature);
         let mut now = cost(placement, &real);
+        if (now - found.cost).abs() <= AS_PROMISED * now {
+            return found;
+        }
         if objective == ConeObjective::AreaDistortion {
             // Strong cones may make the linear picture promise too much: then what it started from is better.
             let (vertices, curvature) = (choice.vertices(), &choice.best.curvature);
@@ -267,41 +268,26 @@ impl Search<'_> {
                 }
             }
         }
-        let mut choice = choice;
-        for _ in 0..SETTLES {
-            let (vertices, curvature) = (&found.vertices, &found.curvature);
-            placement.correct(vertices, curvature, &real);
-            let mut moved = match objective {
-                ConeObjective::LogScale => {
-                    let Some(settled) = placement.settle(choice) else {
-                        break;
-                    };
-                    choice = settled;
-                    Found {
-                        vertices: choice.vertices(),
-                        curvature: choice.best.curvature.clone(),
-                        cost: now,
-                        distortion: 0.0,
-                    }
-                }
-                ConeObjective::AreaDistortion => {
-                    let start = placement.arrangement(vertices, curvature, rule);
-                    placement.near(self.mesh, start, rule, FINE).found()
-                }
-            };
-            real = placement.real_log_scale(&moved.vertices, &moved.curvature);
-            moved.cost = cost(placement, &real);
-            if moved.cost >= now {
-                break;
+        let (vertices, curvature) = (&found.vertices, &found.curvature);
+        placement.correct(vertices, curvature, &real);
+        let mut moved = match objective {
+            ConeObjective::LogScale => match placement.settle(choice) {
+                Some(choice) => Found {
+                    vertices: choice.vertices(),
+                    curvature: choice.best.curvature,
+                    cost: now,
+                    distortion: 0.0,
+                },
+                None => return found,
+            },
+            ConeObjective::AreaDistortion => {
+                let start = placement.arrangement(vertices, curvature, rule);
+                placement.near(self.mesh, start, rule, FINE).found()
             }
-            let goal = now * (1.0 - SETTLED);
-            now = moved.cost;
-            found = moved;
-            if now > goal {
-                break;
-            }
-        }
-        found
+        };
+        let next = placement.real_log_scale(&moved.vertices, &moved.curvature);
+        moved.cost = cost(placement, &next);
+        if moved.cost < now { moved } else { found }
     }
 }
 
