@@ -241,8 +241,8 @@ impl Search<'_> {
         found
     }
 
-    /// Another look, with the log scale that the mesh really has in place of that of the linear picture: where that promised something else,
-    /// places and curvatures are improved near where they are, and kept if the mesh agrees that they are better.
+    /// Another look, with the log scale that the mesh really has in place of that of the linear picture: where that promised something else
+    /// (or the finest moves are still to come, for (9)), places and curvatures are improved near where they are, and kept if the mesh agrees that they are better.
     fn settle(&self, placement: &mut Placement, choice: Choice, found: Found, rule: Rule) -> Found {
         let objective = self.cones.objective;
         let cost = |placement: &Placement, u: &[f64]| match objective {
@@ -252,7 +252,8 @@ impl Search<'_> {
         let mut found = found;
         let mut real = placement.real_log_scale(&found.vertices, &found.curvature);
         let mut now = cost(placement, &real);
-        if (now - found.cost).abs() <= AS_PROMISED * now {
+        let is_as_promised = (now - found.cost).abs() <= AS_PROMISED * now;
+        if objective == ConeObjective::LogScale && is_as_promised {
             return found;
         }
         if objective == ConeObjective::AreaDistortion {

@@ -17,7 +17,7 @@ use crate::geometry::mesh::Mesh;
 /// Gain of ln(F + 1), relative to itself, that a move must have.
 const LEAST_GAIN: f64 = 1e-4;
 /// The same of a round of moves after which another follows.
-const ROUND_GAIN: f64 = 1e-2;
+const ROUND_GAIN: f64 = 1e-3;
 /// Rings around a cone that are tried at once, each half as wide as the one before.
 const RINGS: usize = 3;
 /// What becomes of the radius where none of them helped.

@@ -118,8 +118,7 @@ impl Placement<'_> {
         if count == 0 {
             return self.choose(Vec::new());
         }
-        let starts = STARTS / self.len().max(1);
-        let mut choice = self.first_choice(count, starts, PASSES)?;
+        let mut choice = self.first_choice(count, PASSES)?;
         let [least, most] = MORE_CONES;
         let more = |share: f64| ((share * count as f64) as usize).clamp(least, most);
         let mut more: Vec<usize> = MORE.into_iter().map(more).collect();
@@ -143,7 +142,7 @@ impl Placement<'_> {
 
     /// `count` cones for another search to start from.
     pub(super) fn start(&mut self, count: usize) -> Option<Choice> {
-        self.first_choice(count, 0, START_PASSES)
+        self.first_choice(count, START_PASSES)
     }
 
     /// Adds more cones, exchanges all, takes away as many, and exchanges what is left; keeps that if it is better.
@@ -169,8 +168,8 @@ impl Placement<'_> {
 
     /// From nothing to cones that no single move improves much. On a small mesh, where that is cheap, the first cone is put at several places
     /// in turn.
-    fn first_choice(&mut self, count: usize, starts: usize, passes: usize) -> Option<Choice> {
-        let starts = starts.min(self.samples.len());
+    fn first_choice(&mut self, count: usize, passes: usize) -> Option<Choice> {
+        let starts = (STARTS / self.len().max(1)).min(self.samples.len());
         let step = self.samples.len().div_ceil(starts.max(1)).max(1);
         let firsts = self.samples.iter().copied().step_by(step).take(starts);
         let mut starts = vec![Vec::new()];
