@@ -111,12 +111,6 @@ impl System {
         }
     }
 
-    /// Factorises without a shift.
-    pub(crate) fn factorize(&mut self, hessian: &Hessian) -> Result<(), SolveError> {
-        self.solver
-            .factorize(&hessian.diagonal, &hessian.off_diagonal)
-    }
-
     /// Solves H δ = −residual with `shift` (relative to the largest row) on the diagonal; δ is 0 at vertices that are no
     /// unknowns. `None` where the matrix is not positive definite.
     pub(crate) fn direction(

@@ -116,6 +116,17 @@ impl Placement<'_> {
             .collect()
     }
 
+    /// Cones at these vertices, with curvatures from where Newton's method leads.
+    pub(super) fn arrangement(
+        &mut self,
+        vertices: &[usize],
+        curvature: &[f64],
+        rule: Rule,
+    ) -> Arrangement {
+        let places = self.places(vertices);
+        self.arrange(places, curvature, rule, STEPS)
+    }
+
     /// Cones at these places, after at most `steps` of Newton's method for the curvatures.
     pub(super) fn arrange(
         &self,

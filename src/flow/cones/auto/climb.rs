@@ -6,35 +6,22 @@
 use super::placement::Placement;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::VertexId;
-use rayon::prelude::*;
 
 /// Samples to climb from.
 const SUMMITS: usize = 6;
-/// Samples a thread looks at in one go.
-const PIECE: usize = 256;
 
 impl Placement<'_> {
-    /// Vertices worth more than their neighbours, the best first: uphill from one vertex, or from the best of the samples. `worth` gets a buffer of
-    /// its own.
+    /// Vertices worth more than their neighbours, the best first: uphill from the best of some vertices with their worth. `worth` gets a buffer
+    /// of its own.
     pub(super) fn climb(
         &self,
-        from: Option<usize>,
-        taken: impl Fn(usize) -> bool + Sync,
-        worth: impl Fn(usize, &mut Vec<f64>) -> f64 + Sync,
+        starts: impl Iterator<Item = (usize, f64)>,
+        taken: impl Fn(usize) -> bool,
+        worth: impl Fn(usize, &mut Vec<f64>) -> f64,
     ) -> Vec<(usize, f64)> {
-        let starts = match &from {
-            Some(vertex) => std::slice::from_ref(vertex),
-            None => &self.samples,
-        };
-        let scored: Vec<(usize, f64)> = starts
-            .par_iter()
-            .with_min_len(PIECE)
-            .filter(|&&v| !taken(v))
-            .map_init(Vec::new, |row, &v| (v, worth(v, row)))
-            .collect();
         let mut row = Vec::new();
         let mut tops: Vec<(usize, f64)> = Vec::new();
-        for mut top in summits(&scored) {
+        for mut top in summits(starts.filter(|start| !taken(start.0))) {
             loop {
                 let around = self.connectivity.neighbours(VertexId::new(top.0));
                 let next = around
@@ -58,9 +45,9 @@ impl Placement<'_> {
 }
 
 /// The few that are worth most.
-fn summits(scored: &[(usize, f64)]) -> Vec<(usize, f64)> {
+fn summits(scored: impl Iterator<Item = (usize, f64)>) -> Vec<(usize, f64)> {
     let mut best: Vec<(usize, f64)> = Vec::with_capacity(SUMMITS + 1);
-    for &one in scored {
+    for one in scored {
         let place = best.partition_point(|b| b.1 >= one.1);
         if place < SUMMITS {
             best.insert(place, one);

@@ -4,12 +4,11 @@
 //!
 //! The places where a cone could help most are where the force p = ∂ ln(F + 1)/∂K is farthest from what it is at the cones: a little curvature there
 //! gains that much. p is smooth but at the cones, so it has few extremes. They join a pool with places spread over the surface, and
-//! the best of the pool are searched for on cells of the surface, by exchange, by adding some and taking away as many: a trial, with the best
-//! curvatures of all cones, costs sums over cells and no solve. What a cone does to the faces next to it rules (9), so the vertices around every
-//! place of the pool are cells of their own.
+//! the best of the pool are searched for on [`cells`](super::cells) of the surface, by exchange, by adding some and taking away as many: a
+//! trial, with the best curvatures of all cones, costs sums over cells and no solve.
 
-use super::area::{Points, Weighed};
 use super::arrangement::{Arrangement, Place, Rule, STEPS};
+use super::cells::{Coarse, Set};
 use super::placement::Placement;
 use super::quadratic::Limits;
 use crate::flow::cones::spread;
@@ -18,7 +17,7 @@ use crate::geometry::mesh::Mesh;
 use rayon::prelude::*;
 
 /// Places spread over the surface.
-const SPREAD: usize = 32;
+const SPREAD: usize = 24;
 /// Extremes that are added at most each time.
 const EXTREMES: usize = 16;
 /// Gain of ln(F + 1), relative to itself, that another choice must promise …
@@ -29,8 +28,12 @@ const STEP_GAIN: f64 = 1e-3;
 const PASSES: usize = 12;
 /// Exchanges tried in full at most, those first that promise most.
 const TRIALS: usize = 6;
-/// How many cones are added, as shares of their number, before as many are taken away again.
+/// How many cones are added, as shares of their number, before as many are taken away again …
 const MORE: [f64; 2] = [1.0, 0.5];
+/// … and how many at most.
+const MOST_MORE: usize = 8;
+/// Newton steps for the curvatures after a place came or went, after which they change little.
+const CHANGED_STEPS: usize = 2;
 
 /// Places whose answers are known.
 pub(super) struct Pool(Vec<Place>);
@@ -70,20 +73,10 @@ pub(super) fn far(
     rule: Rule,
 ) -> Option<(Vec<Place>, Vec<f64>)> {
     pool.widen(placement, now);
-    let cells = Cells::new(placement, &pool.0);
-    let base = cells.means(&placement.base);
-    let answers: Vec<Vec<f64>> = pool.0.par_iter().map(|p| cells.means(&p.answer)).collect();
-    let search = Search {
-        points: Points {
-            weight: &cells.weight,
-            base: &base,
-        },
-        answers: &answers,
-        rule,
-    };
+    let search = Coarse::new(placement, &pool.0, rule);
     let vertices = now.vertices();
     let members: Option<Vec<usize>> = vertices.iter().map(|&v| pool.index(v)).collect();
-    let first = search.weigh(members?, now.curvature());
+    let first = search.weigh(members?, now.curvature(), STEPS);
     let least = first.weighed.value;
     let best = search.improve(first);
     (best.weighed.value < least * (1.0 - LEAST_GAIN)).then(|| {
@@ -92,31 +85,7 @@ pub(super) fn far(
     })
 }
 
-/// Some places of the pool with their best curvatures.
-#[derive(Clone)]
-struct Set {
-    members: Vec<usize>,
-    weighed: Weighed,
-}
-
-/// A search among the places of the pool.
-struct Search<'a> {
-    points: Points<'a>,
-    answers: &'a [Vec<f64>],
-    rule: Rule,
-}
-
-impl Search<'_> {
-    fn views(&self, members: &[usize]) -> Vec<&[f64]> {
-        members.iter().map(|&m| &*self.answers[m]).collect()
-    }
-
-    fn weigh(&self, members: Vec<usize>, curvature: &[f64]) -> Set {
-        let answers = self.views(&members);
-        let weighed = self.rule.apply(self.points, &answers, curvature, STEPS);
-        Set { members, weighed }
-    }
-
+impl Coarse {
     fn improve(&self, set: Set) -> Set {
         let count = set.members.len();
         let mut best = self.exchange(set);
@@ -124,8 +93,10 @@ impl Search<'_> {
         let Rule::Best(limits) = self.rule else {
             return best;
         };
-        for share in MORE {
-            let more = ((share * count as f64) as usize).max(1);
+        let more = MORE.map(|share| ((share * count as f64) as usize).clamp(1, MOST_MORE));
+        let mut more = more.to_vec();
+        more.dedup();
+        for more in more {
             let many = self.grow(best.clone(), count + more, limits);
             let few = self.exchange(self.prune(many, count, limits));
             if few.members.len() <= count && few.weighed.value < best.weighed.value {
@@ -143,17 +114,10 @@ impl Search<'_> {
     fn exchange(&self, mut set: Set) -> Set {
         for _ in 0..PASSES {
             let goal = set.weighed.value * (1.0 - STEP_GAIN);
-            let answers = self.views(&set.members);
             let count = set.members.len();
             let exchanges = (0..count).flat_map(|i| self.others(&set).map(move |m| (i, m)));
             let exchanges: Vec<(usize, usize)> = exchanges.collect();
-            let promise = |&(i, m): &(usize, usize)| {
-                let mut with = answers.clone();
-                let old = std::mem::replace(&mut with[i], &self.answers[m]);
-                let limits = self.rule.limits();
-                let value = self.points.moved(&set.weighed, &with, i, old, limits);
-                (value, i, m)
-            };
+            let promise = |&(i, m): &(usize, usize)| (self.moved(&set, i, m), i, m);
             let mut promised: Vec<(f64, usize, usize)> =
                 exchanges.par_iter().map(promise).collect();
             promised.retain(|p| p.0 < goal);
@@ -162,7 +126,7 @@ impl Search<'_> {
             let better = promised.iter().take(TRIALS).find_map(|&(_, i, m)| {
                 let mut members = set.members.clone();
                 members[i] = m;
-                let next = self.weigh(members, &set.weighed.curvature);
+                let next = self.weigh(members, &set.weighed.curvature, STEPS);
                 (next.weighed.value < goal).then_some(next)
             });
             match better {
@@ -177,17 +141,19 @@ impl Search<'_> {
     fn grow(&self, mut set: Set, count: usize, limits: Limits) -> Set {
         while set.members.len() < count {
             let others: Vec<usize> = self.others(&set).collect();
-            let promised = self.points.with_one_more(
+            let promised = self.points().with_one_more(
                 &set.weighed,
                 &self.views(&set.members),
                 &self.views(&others),
                 limits,
             );
-            let Some(best) = least(&promised) else { break };
+            let Some(best) = least_of(&promised) else {
+                break;
+            };
             let (mut members, mut curvature) = (set.members, set.weighed.curvature);
             members.push(others[best]);
             curvature.push(0.0);
-            set = self.weigh(members, &curvature);
+            set = self.weigh(members, &curvature, CHANGED_STEPS);
         }
         set
     }
@@ -196,19 +162,21 @@ impl Search<'_> {
     fn prune(&self, mut set: Set, count: usize, limits: Limits) -> Set {
         while set.members.len() > count {
             let answers = self.views(&set.members);
-            let promised = self.points.with_one_less(&set.weighed, &answers, limits);
-            let Some(worst) = least(&promised) else { break };
+            let promised = self.points().with_one_less(&set.weighed, &answers, limits);
+            let Some(worst) = least_of(&promised) else {
+                break;
+            };
             let (mut members, mut curvature) = (set.members, set.weighed.curvature);
             members.remove(worst);
             curvature.remove(worst);
-            set = self.weigh(members, &curvature);
+            set = self.weigh(members, &curvature, CHANGED_STEPS);
         }
         set
     }
 }
 
 /// The first of the least values.
-fn least(values: &[f64]) -> Option<usize> {
+pub(super) fn least_of(values: &[f64]) -> Option<usize> {
     let order = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]);
     (0..values.len()).min_by(order)
 }
@@ -241,59 +209,4 @@ fn extremes(placement: &Placement, now: &Arrangement, force: &[f64]) -> Vec<usiz
     extremes.sort_by(|a, b| b.0.total_cmp(&a.0));
     extremes.truncate(EXTREMES);
     extremes.into_iter().map(|(_, v)| v).collect()
-}
-
-/// The surface in cells: single vertices around some places, cells around the samples elsewhere.
-struct Cells {
-    /// Cell of every vertex.
-    cell: Vec<u32>,
-    /// Area of every vertex and of every cell, all together 1.
-    vertex_weight: Vec<f64>,
-    weight: Vec<f64>,
-}
-
-impl Cells {
-    fn new(placement: &Placement, places: &[Place]) -> Self {
-        let c = placement.connectivity;
-        let centres: Vec<usize> = placement.samples.iter().copied().step_by(2).collect();
-        let mut cell = spread::nearest_of(c, &centres);
-        let mut count = centres.len() as u32;
-        let own = |v: usize, cell: &mut Vec<u32>, count: &mut u32| {
-            // A vertex that is alone already stays so.
-            if (cell[v] as usize) < centres.len() {
-                cell[v] = *count;
-                *count += 1;
-            }
-        };
-        for place in places {
-            let ring: Vec<VertexId> = c.neighbours(VertexId::new(place.vertex)).collect();
-            own(place.vertex, &mut cell, &mut count);
-            for &v in &ring {
-                own(v.index(), &mut cell, &mut count);
-                for w in c.neighbours(v) {
-                    own(w.index(), &mut cell, &mut count);
-                }
-            }
-        }
-        let mut weight = vec![0.0; count as usize];
-        for (&c, w) in cell.iter().zip(&placement.picture.weight) {
-            weight[c as usize] += w;
-        }
-        Self {
-            cell,
-            vertex_weight: placement.picture.weight.clone(),
-            weight,
-        }
-    }
-
-    fn means(&self, field: &[f64]) -> Vec<f64> {
-        let mut means = vec![0.0; self.weight.len()];
-        for ((&c, w), x) in self.cell.iter().zip(&self.vertex_weight).zip(field) {
-            means[c as usize] += w * x;
-        }
-        for (m, w) in means.iter_mut().zip(&self.weight) {
-            *m = if *w > 0.0 { *m / w } else { 0.0 };
-        }
-        means
-    }
 }

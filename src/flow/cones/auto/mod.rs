@@ -19,6 +19,7 @@
 
 mod area;
 mod arrangement;
+mod cells;
 mod climb;
 mod far;
 mod moves;
@@ -37,6 +38,7 @@ use crate::geometry::connectivity::Topology;
 use crate::geometry::ids::{VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
 use arrangement::Rule;
+use moves::FINE;
 use picture::Picture;
 use placement::{Choice, Placement};
 use quadratic::Limits;
@@ -45,6 +47,8 @@ use std::f64::consts::TAU;
 
 /// Share of the least variance of the log scale that counts as hardly more: a quarter of the standard deviation.
 const NEAR_COST: f64 = 0.6;
+/// Share of the real cost by which the linear picture may be wrong before it is corrected.
+const AS_PROMISED: f64 = 0.02;
 /// Curvatures in excess of a limit that are rounding, radians.
 const ROUNDING: f64 = 1e-9;
 
@@ -182,12 +186,21 @@ fn cheapest(found: Vec<Found>) -> Option<Found> {
 impl Search<'_> {
     /// The best cones within the limits of the placement; `None` where no whole quanta meet the total.
     fn run(&self, placement: &mut Placement) -> Result<Vec<Found>, ConeError> {
+        let objective = self.cones.objective;
+        let is_start = objective == ConeObjective::AreaDistortion
+            && self.quanta.is_none()
+            && self.cones.log_scale_bound.is_none();
         let choice = match self.cones.log_scale_bound {
             Some(bound) => placement.search_bounded(self.least, self.most, bound),
+            // What is moved by another measure needs no more.
+            None if is_start => placement.start(self.most),
             None => placement.search(self.most),
         };
-        let choice = choice.ok_or_else(|| not_chosen("places for cones cannot be told apart"))?;
-        let choice = placement.drop_idle(choice, self.least);
+        let mut choice =
+            choice.ok_or_else(|| not_chosen("places for cones cannot be told apart"))?;
+        if !is_start {
+            choice = placement.drop_idle(choice, self.least);
+        }
         let mut found = Found {
             vertices: choice.vertices(),
             curvature: choice.best.curvature.clone(),
@@ -197,15 +210,14 @@ impl Search<'_> {
         if found.vertices.is_empty() {
             return Ok(vec![found]);
         }
-        let objective = self.cones.objective;
         if let Some(quanta) = self.quanta {
             return Ok(self.in_quanta(placement, &choice, quanta));
         }
         let rule = Rule::Best(placement.limits);
         if objective == ConeObjective::AreaDistortion {
-            let (vertices, curvature) = (&found.vertices, &found.curvature);
-            let moved = placement.lower_distortion(self.mesh, vertices, curvature, rule);
-            found = moved.found();
+            let start = placement.arrangement(&found.vertices, &found.curvature, rule);
+            let moved = placement.lower_distortion(self.mesh, start, rule);
+            found = placement.drop_idle_of(moved, self.least, rule).found();
         }
         Ok(vec![self.settle(placement, choice, found, rule)])
     }
@@ -229,8 +241,8 @@ impl Search<'_> {
         found
     }
 
-    /// One more look, with the log scale that the mesh really has in place of that of the linear picture: places and curvatures are improved
-    /// near where they are, and kept where the mesh agrees that they are better.
+    /// Another look, with the log scale that the mesh really has in place of that of the linear picture: where that promised something else
+    /// (or the finest moves are still to come, for (9)), places and curvatures are improved near where they are, and kept if the mesh agrees that they are better.
     fn settle(&self, placement: &mut Placement, choice: Choice, found: Found, rule: Rule) -> Found {
         let objective = self.cones.objective;
         let cost = |placement: &Placement, u: &[f64]| match objective {
@@ -240,14 +252,21 @@ impl Search<'_> {
         let mut found = found;
         let mut real = placement.real_log_scale(&found.vertices, &found.curvature);
         let mut now = cost(placement, &real);
+        let is_as_promised = (now - found.cost).abs() <= AS_PROMISED * now;
+        if objective == ConeObjective::LogScale && is_as_promised {
+            return found;
+        }
         if objective == ConeObjective::AreaDistortion {
             // Strong cones may make the linear picture promise too much: then what it started from is better.
             let (vertices, curvature) = (choice.vertices(), &choice.best.curvature);
-            let first = placement.real_log_scale(&vertices, curvature);
-            if cost(placement, &first) < now {
-                now = cost(placement, &first);
-                real = first;
-                (found.vertices, found.curvature) = (vertices, curvature.clone());
+            let promised = placement.log_scale_of(vertices.iter().zip(curvature));
+            if cost(placement, &promised) < now {
+                let first = placement.real_log_scale(&vertices, curvature);
+                if cost(placement, &first) < now {
+                    now = cost(placement, &first);
+                    real = first;
+                    (found.vertices, found.curvature) = (vertices, curvature.clone());
+                }
             }
         }
         let (vertices, curvature) = (&found.vertices, &found.curvature);
@@ -262,9 +281,10 @@ impl Search<'_> {
                 },
                 None => return found,
             },
-            ConeObjective::AreaDistortion => placement
-                .settle_distortion(self.mesh, vertices, curvature, rule)
-                .found(),
+            ConeObjective::AreaDistortion => {
+                let start = placement.arrangement(vertices, curvature, rule);
+                placement.near(self.mesh, start, rule, FINE).found()
+            }
         };
         let next = placement.real_log_scale(&moved.vertices, &moved.curvature);
         moved.cost = cost(placement, &next);

@@ -4,10 +4,11 @@
 //!
 //! The derivative of (9) by curvature, p = Δ⁻¹ ∂(9)/∂u, is one back-substitution for all vertices. By symmetry of the answers a cone
 //! of curvature c at x feels the force −c ∇p(x), so the vertices to try are those of some rings around x where c p is least: one a ring. All
-//! that are tried at once share one sweep of back-substitutions, and [`Points::moved`](super::area::Points::moved) says what each is worth;
-//! the rings shrink down to the neighbours when none helps. This moves cones as Li et al. 2023 do, with sets of candidates in place of a line search.
+//! that are tried at once share one sweep of back-substitutions, and [`cells`](super::cells) say what each is worth; what they all come to is
+//! weighed on all vertices. The rings shrink down to the neighbours when none helps. This moves cones as Li et al. 2023 do, with sets of candidates in place of a line search.
 
-use super::arrangement::{Arrangement, Place, Rule, STEPS, answers};
+use super::arrangement::{Arrangement, Rule, STEPS};
+use super::cells::{Coarse, Set};
 use super::placement::Placement;
 use crate::flow::cones::spread;
 use crate::geometry::ids::VertexId;
@@ -15,8 +16,12 @@ use crate::geometry::mesh::Mesh;
 
 /// Gain of ln(F + 1), relative to itself, that a move must have.
 const LEAST_GAIN: f64 = 1e-4;
+/// The same of a round of moves after which another follows.
+const ROUND_GAIN: f64 = 1e-3;
 /// Rings around a cone that are tried at once, each half as wide as the one before.
 const RINGS: usize = 3;
+/// What becomes of the radius where none of them helped.
+const SHRUNK: f64 = 0.125;
 /// Newton steps for the curvatures after a move, after which they change little.
 const MOVED_STEPS: usize = 1;
 
@@ -30,37 +35,65 @@ struct Candidate {
 }
 
 impl Placement<'_> {
-    /// Moves the cones, starting with rings of `radius`, in square roots of the area.
+    /// Moves the cones, with rings from the first to the least radius, in square roots of the area.
     pub(super) fn near(
         &mut self,
         mesh: &Mesh,
         mut now: Arrangement,
         rule: Rule,
-        radius: f64,
+        radii: [f64; 2],
     ) -> Arrangement {
-        let area = super::picture::total_area(mesh);
-        let mut radius = vec![radius * area.sqrt(); now.places.len()];
+        let size = super::picture::total_area(mesh).sqrt();
+        let [first, least] = radii.map(|radius| radius * size);
+        let mut radius = vec![first; now.places.len()];
         loop {
+            for at_rest in radius.iter_mut().filter(|radius| **radius < least) {
+                *at_rest = 0.0;
+            }
             let force = self.force(&now);
             let candidates = self.candidates(mesh, &now, &force, &mut radius);
             if candidates.is_empty() {
-                let curvature = now.weighed.curvature;
-                return self.arrange(now.places, &curvature, rule, STEPS);
+                break;
             }
             let vertices: Vec<usize> = candidates.iter().map(|c| c.vertex).collect();
-            let places = self.places(&vertices);
-            let tried: Vec<(Candidate, Place)> = candidates.into_iter().zip(places).collect();
+            let count = now.places.len();
+            let mut places = now.places.clone();
+            places.extend(self.places(&vertices));
+            let coarse = Coarse::new(self, &places, rule);
+            let mut set = coarse.weigh((0..count).collect(), now.curvature(), MOVED_STEPS);
+            // The places of the candidates follow those of the cones.
+            let tried: Vec<(Candidate, usize)> = candidates.into_iter().zip(count..).collect();
+            let mut has_moved = false;
             for some in tried.chunk_by(|a, b| a.0.cone == b.0.cone) {
                 let cone = some[0].0.cone;
-                match self.best_move(&now, some, rule) {
+                let taken = |v: usize| set.members.iter().any(|&m| places[m].vertex == v);
+                let free = some.iter().filter(|one| !taken(one.0.vertex));
+                match best_move(&coarse, &set, free) {
                     Some((next, reached)) => {
-                        now = next;
+                        (set, has_moved) = (next, true);
                         radius[cone] = reached;
                     }
-                    None => radius[cone] *= 0.5f64.powi(RINGS as i32),
+                    None => radius[cone] *= SHRUNK,
                 }
             }
+            if !has_moved {
+                continue;
+            }
+            let places = set.members.iter().map(|&m| places[m].clone()).collect();
+            let next = self.arrange(places, &set.weighed.curvature, rule, MOVED_STEPS);
+            if next.value() < now.value() {
+                let goal = now.value() * (1.0 - ROUND_GAIN);
+                now = next;
+                if now.value() > goal {
+                    break;
+                }
+            } else {
+                // The cells promised too much.
+                radius.iter_mut().for_each(|r| *r *= SHRUNK);
+            }
         }
+        let curvature = now.weighed.curvature;
+        self.arrange(now.places, &curvature, rule, STEPS)
     }
 
     /// One vertex a ring for every cone that is not at rest; cones whose rings are empty come to rest.
@@ -106,33 +139,23 @@ impl Placement<'_> {
         }
         candidates
     }
+}
 
-    /// The best of some moves of one cone, and the radius of its ring; `None` where none gains enough.
-    fn best_move(
-        &self,
-        now: &Arrangement,
-        tried: &[(Candidate, Place)],
-        rule: Rule,
-    ) -> Option<(Arrangement, f64)> {
-        let goal = now.value() * (1.0 - LEAST_GAIN);
-        let promise = |(candidate, place): &(Candidate, Place)| {
-            let mut with = answers(&now.places);
-            let old = std::mem::replace(&mut with[candidate.cone], &place.answer);
-            self.points()
-                .moved(&now.weighed, &with, candidate.cone, old, rule.limits())
-        };
-        // Another cone may have come to the same vertex.
-        let is_free = |v: usize| now.places.iter().all(|p| p.vertex != v);
-        let free = tried.iter().filter(|one| is_free(one.0.vertex));
-        let promised = free.map(|one| (promise(one), one));
-        let best = promised.reduce(|a, b| if b.0 < a.0 { b } else { a })?;
-        let (candidate, place) = best.1;
-        if best.0 >= goal {
-            return None;
-        }
-        let mut places = now.places.clone();
-        places[candidate.cone] = place.clone();
-        let next = self.arrange(places, now.curvature(), rule, MOVED_STEPS);
-        (next.value() < goal).then_some((next, candidate.radius))
+/// The best of some moves of one cone, and the radius of its ring; `None` where none gains enough.
+fn best_move<'t>(
+    coarse: &Coarse,
+    set: &Set,
+    tried: impl Iterator<Item = &'t (Candidate, usize)>,
+) -> Option<(Set, f64)> {
+    let goal = set.weighed.value * (1.0 - LEAST_GAIN);
+    let promised = tried.map(|one| (coarse.moved(set, one.0.cone, one.1), one));
+    let best = promised.reduce(|a, b| if b.0 < a.0 { b } else { a })?;
+    let (candidate, place) = best.1;
+    if best.0 >= goal {
+        return None;
     }
+    let mut members = set.members.clone();
+    members[candidate.cone] = *place;
+    let next = coarse.weigh(members, &set.weighed.curvature, MOVED_STEPS);
+    (next.weighed.value < goal).then_some((next, candidate.radius))
 }

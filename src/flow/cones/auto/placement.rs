@@ -17,6 +17,7 @@ use super::picture::Picture;
 use super::quadratic::{Best, Limits, Quadratic};
 use crate::flow::solve::solve_dense;
 use crate::geometry::connectivity::Connectivity;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -24,6 +25,10 @@ use std::sync::Arc;
 const KNOWN: usize = 1 << 25;
 /// Vertices that are looked at everywhere; from the best of them the search climbs to a vertex that is better than its neighbours.
 const SAMPLES: usize = 2000;
+/// Vertices to climb from where every step takes the best curvatures of all cones.
+const CLIMBS: usize = 3;
+/// Samples whose worth is told side by side.
+const PIECE: usize = 256;
 
 /// Cones to be chosen; see the module docs.
 pub(super) struct Placement<'a> {
@@ -47,7 +52,9 @@ pub(super) struct Placement<'a> {
     /// Where the search begins.
     pub(super) samples: Vec<usize>,
     /// Columns of B that were computed: the search comes back to the same places again and again.
-    known: BTreeMap<usize, Arc<[f64]>>,
+    known: BTreeMap<usize, Site>,
+    /// Places answered so far.
+    pub(super) answered: usize,
 }
 
 /// A vertex with its column of B.
@@ -55,6 +62,8 @@ pub(super) struct Placement<'a> {
 pub(super) struct Site {
     pub(super) vertex: usize,
     column: Arc<[f64]>,
+    /// The column at the samples.
+    sampled: Arc<[f64]>,
 }
 
 /// Chosen places and their best curvatures.
@@ -103,6 +112,7 @@ impl<'a> Placement<'a> {
             limits,
             allowed,
             known: BTreeMap::new(),
+            answered: 0,
         };
         placement.weigh_base();
         placement
@@ -170,6 +180,7 @@ impl<'a> Placement<'a> {
 
     /// g of some vertices, one after another: the log scale that a unit of curvature causes there.
     pub(super) fn responses(&mut self, vertices: &[usize]) -> Vec<f64> {
+        self.answered += vertices.len();
         let mut fields = Vec::with_capacity(vertices.len() * self.len());
         for &v in vertices {
             let from = fields.len();
@@ -210,14 +221,16 @@ impl<'a> Placement<'a> {
             self.picture.centre(field);
         }
         self.dual(&mut fields);
-        let columns = new.iter().zip(fields.chunks(n));
-        self.known
-            .extend(columns.map(|(&v, column)| (v, Arc::from(column))));
-        let site = |&vertex: &usize| {
-            let column = self.known.get(&vertex)?.clone();
-            Some(Site { vertex, column })
-        };
-        vertices.iter().filter_map(site).collect()
+        for (&vertex, column) in new.iter().zip(fields.chunks(n)) {
+            let site = Site {
+                vertex,
+                column: Arc::from(column),
+                sampled: self.samples.iter().map(|&v| column[v]).collect(),
+            };
+            self.known.insert(vertex, site);
+        }
+        let known = vertices.iter().map(|v| self.known.get(v).cloned());
+        known.flatten().collect()
     }
 
     /// The best curvatures at given places; `None` where the places are too close to each other to tell them apart.
@@ -245,8 +258,8 @@ impl<'a> Placement<'a> {
 
     /// Vertices that are worth most beside `choice`, and the variance that each promises at the least; near a vertex, or anywhere.
     ///
-    /// Where curvatures are at a limit, two are named: one for cones that stay there, and one for cones that need not, because the new one
-    /// relieves them. The second matters most where too few cones must make up the total and all are at their limits.
+    /// Where curvatures are at a limit, the search begins at places for cones that stay there, and at places for cones that need not, because
+    /// the new one relieves them. The second matter most where too few cones must make up the total and all are at their limits.
     pub(super) fn best_additions(&self, choice: &Choice, from: Option<usize>) -> Vec<(usize, f64)> {
         self.additions(choice, from, 1)
     }
@@ -258,23 +271,52 @@ impl<'a> Placement<'a> {
         from: Option<usize>,
         most: usize,
     ) -> Vec<(usize, f64)> {
-        let mut found: Vec<(usize, f64)> = Vec::new();
-        if choice.best.is_inside.iter().any(|inside| !inside) {
-            let unlimited = Limits {
-                range: [f64::NEG_INFINITY, f64::INFINITY],
-                ..self.limits
+        let others = || {
+            let found = self.beside(&choice.sites, &choice.best, from);
+            found.unwrap_or_default()
+        };
+        let mut found = if choice.best.is_inside.iter().all(|inside| *inside) {
+            others()
+        } else {
+            let starts: Vec<usize> = match from {
+                Some(vertex) => vec![vertex],
+                None => {
+                    let unlimited = Limits {
+                        range: [f64::NEG_INFINITY, f64::INFINITY],
+                        ..self.limits
+                    };
+                    let relieved = self.program(&choice.sites).minimise(unlimited);
+                    let relieved =
+                        relieved.and_then(|best| self.beside(&choice.sites, &best, from));
+                    let both = relieved.into_iter().flatten().chain(others());
+                    both.map(|found| found.0).collect()
+                }
             };
-            let relieved = self.program(&choice.sites).minimise(unlimited);
-            let relieved = relieved.and_then(|best| self.beside(&choice.sites, &best, from));
-            found.extend(relieved.unwrap_or_default().into_iter().take(most));
-        }
-        let others = self.beside(&choice.sites, &choice.best, from);
-        for other in others.unwrap_or_default().into_iter().take(most) {
-            if found.iter().all(|one| one.0 != other.0) {
-                found.push(other);
-            }
-        }
+            self.within_limits(&choice.sites, &starts)
+        };
+        found.truncate(most);
         found
+    }
+
+    /// Vertices that are worth most beside `sites`, uphill from some, the best first, and the variance with each. Promises are too low where
+    /// curvatures are at their limits, so here the best curvatures of all are found for every vertex that is looked at.
+    fn within_limits(&self, sites: &[Site], from: &[usize]) -> Vec<(usize, f64)> {
+        let known = self.program(sites);
+        let gain = |v: usize, row: &mut Vec<f64>| -> f64 {
+            row.clear();
+            row.extend(sites.iter().map(|s| s.column[v]));
+            let with = known.with_one_more(row, self.self_energy[v], self.slope[v]);
+            let best = with.minimise(self.limits);
+            best.map_or(f64::NEG_INFINITY, |best| -best.energy)
+        };
+        let taken = |v: usize| !self.allowed[v] || sites.iter().any(|s| s.vertex == v);
+        let mut row = Vec::new();
+        let mut starts: Vec<(usize, f64)> = from.iter().map(|&v| (v, gain(v, &mut row))).collect();
+        // Stable: of equals the first.
+        starts.sort_by(|a, b| b.1.total_cmp(&a.1));
+        starts.truncate(CLIMBS);
+        let tops = self.climb(starts.into_iter(), taken, gain).into_iter();
+        tops.map(|(v, gain)| (v, self.base_energy - gain)).collect()
     }
 
     /// Vertices that are worth most beside cones of given curvatures, the best first, and the variance that each promises.
@@ -299,15 +341,7 @@ impl<'a> Placement<'a> {
         let [low, high] = self.limits.for_count(sites.len() + 1).range;
         let first = sites.is_empty().then_some(self.limits.total).flatten();
         let taken = |v: usize| !self.allowed[v] || sites.iter().any(|s| s.vertex == v);
-        let gain = |v: usize, row: &mut Vec<f64>| -> f64 {
-            let e = chosen.multiplier + self.derivative(v, sites, &chosen.curvature);
-            row.clear();
-            row.extend(inside.iter().map(|&i| sites[i].column[v]));
-            row.resize(size, 1.0);
-            let explained: f64 = (0..size)
-                .map(|i| row[i] * dot(&inverse[i * size..][..size], row))
-                .sum();
-            let own = self.self_energy[v];
+        let worth = |e: f64, explained: f64, own: f64| -> f64 {
             let s = (own - explained).max(1e-6 * own);
             let c = first.unwrap_or((-e / s).clamp(low, high));
             match c == 0.0 {
@@ -316,8 +350,56 @@ impl<'a> Placement<'a> {
                 false => -c * (2.0 * e + c * s),
             }
         };
+        let gain = |v: usize, row: &mut Vec<f64>| -> f64 {
+            let e = chosen.multiplier + self.derivative(v, sites, &chosen.curvature);
+            row.clear();
+            row.extend(inside.iter().map(|&i| sites[i].column[v]));
+            row.resize(size, 1.0);
+            let explained: f64 = (0..size)
+                .map(|i| row[i] * dot(&inverse[i * size..][..size], row))
+                .sum();
+            worth(e, explained, self.self_energy[v])
+        };
+        // All samples side by side.
+        let piece = |(piece, samples): (usize, &[usize])| -> Vec<(usize, f64)> {
+            let here = piece * PIECE..piece * PIECE + samples.len();
+            let mut e: Vec<f64> = samples.iter().map(|&v| self.slope[v]).collect();
+            for (site, c) in sites.iter().zip(&chosen.curvature) {
+                add_scaled(&mut e, *c, &site.sampled[here.clone()]);
+            }
+            let mut explained = vec![0.0; samples.len()];
+            let ones = [1.0; PIECE];
+            let row = |i: usize| match inside.get(i) {
+                Some(&site) => &sites[site].sampled[here.clone()],
+                None => &ones[..samples.len()],
+            };
+            for i in 0..size {
+                // The matrix is symmetric.
+                let mut sum = vec![0.0; samples.len()];
+                add_scaled(&mut sum, inverse[i * size + i], row(i));
+                for j in 0..i {
+                    add_scaled(&mut sum, 2.0 * inverse[i * size + j], row(j));
+                }
+                let terms = explained.iter_mut().zip(row(i)).zip(&sum);
+                terms.for_each(|((x, r), s)| *x += r * s);
+            }
+            let terms = samples.iter().zip(&e).zip(&explained);
+            terms
+                .map(|((&v, e), explained)| {
+                    let e = chosen.multiplier + e;
+                    (v, worth(e, *explained, self.self_energy[v]))
+                })
+                .collect()
+        };
+        let starts: Vec<(usize, f64)> = match from {
+            Some(v) => vec![(v, gain(v, &mut Vec::new()))],
+            None => {
+                let pieces = self.samples.par_chunks(PIECE).enumerate().map(piece);
+                pieces.collect::<Vec<_>>().concat()
+            }
+        };
         let now = self.base_energy + chosen.energy;
-        let tops = self.climb(from, taken, gain).into_iter();
+        let tops = self.climb(starts.into_iter(), taken, gain).into_iter();
         Some(tops.map(|(v, gain)| (v, now - gain)).collect())
     }
 
@@ -364,6 +446,11 @@ impl<'a> Placement<'a> {
         sites.remove(i);
         self.choose(sites)
     }
+}
+
+/// Adds c times b to a.
+fn add_scaled(a: &mut [f64], c: f64, b: &[f64]) {
+    a.iter_mut().zip(b).for_each(|(a, b)| *a += c * b);
 }
 
 /// Σ a b in a fixed order.

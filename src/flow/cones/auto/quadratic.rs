@@ -76,6 +76,24 @@ pub(super) struct Best {
 }
 
 impl Quadratic {
+    /// With one variable more: its row of the matrix, its own entry there, and its slope.
+    pub(super) fn with_one_more(&self, row: &[f64], own: f64, slope: f64) -> Self {
+        let count = self.len();
+        let mut matrix = Vec::with_capacity((count + 1) * (count + 1));
+        for (i, x) in row.iter().enumerate() {
+            matrix.extend_from_slice(&self.matrix[i * count..][..count]);
+            matrix.push(*x);
+        }
+        matrix.extend_from_slice(row);
+        matrix.push(own);
+        let mut slopes = self.slope.clone();
+        slopes.push(slope);
+        Self {
+            slope: slopes,
+            matrix,
+        }
+    }
+
     fn len(&self) -> usize {
         self.slope.len()
     }

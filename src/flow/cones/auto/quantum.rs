@@ -10,6 +10,7 @@
 use super::Found;
 use super::area::Points;
 use super::arrangement::{Arrangement, Rule};
+use super::moves::FINE;
 use super::placement::{Choice, Placement, Site};
 use super::quadratic::Limits;
 use crate::geometry::mesh::Mesh;
@@ -244,7 +245,11 @@ fn best_place(
                 -c * (2.0 * e + c * placement.self_energy[v])
             };
             let taken = |v: usize| !placement.allowed[v] || others.iter().any(|s| s.vertex == v);
-            let &(vertex, gain) = placement.climb(None, taken, worth).first()?;
+            let mut none = Vec::new();
+            let samples = placement.samples.iter().map(|&v| (v, worth(v, &mut none)));
+            let samples: Vec<(usize, f64)> = samples.collect();
+            let tops = placement.climb(samples.into_iter(), taken, worth);
+            let &(vertex, gain) = tops.first()?;
             Some((vertex, k, rest - gain))
         })
         .reduce(|a, b| if b.2 < a.2 { b } else { a })
@@ -259,8 +264,9 @@ pub(super) fn lower_distortion(
 ) -> Found {
     found.cost = f64::INFINITY;
     for _ in 0..ROUNDS {
-        let (vertices, curvature) = (&found.vertices, &found.curvature);
-        let now = placement.lower_distortion(mesh, vertices, curvature, Rule::Fixed);
+        let start = placement.arrangement(&found.vertices, &found.curvature, Rule::Fixed);
+        let now = placement.lower_distortion(mesh, start, Rule::Fixed);
+        let now = placement.near(mesh, now, Rule::Fixed, FINE);
         if now.value() >= found.cost * (1.0 - LEAST_GAIN) {
             break;
         }

@@ -15,20 +15,22 @@ const COARSE_GAIN: f64 = 1e-2;
 const FINE_GAIN: f64 = 1e-4;
 /// How many cones are added, as shares of their number, before as many are taken away again.
 const MORE: [f64; 3] = [1.0, 0.5, 0.25];
-/// The same at the least.
-const LEAST_MORE: usize = 2;
-/// How often that is gone through at most, as long as it helps.
-const CYCLES: usize = 3;
+/// The same at the least and at most.
+const MORE_CONES: [usize; 2] = [2, 8];
+/// How often that is gone through at most, until none of it helps.
+const CYCLES: usize = 2;
 /// A cone is idle that lowers the standard deviation of the log scale by less than this share …
-const IDLE: f64 = 0.01;
+pub(super) const IDLE: f64 = 0.01;
 /// … and so is every one where it is below this without.
-const NOTHING: f64 = 1e-6;
+pub(super) const NOTHING: f64 = 1e-6;
 /// Share of the energy that may be rounding.
 const ROUNDING: f64 = 1e-7;
 /// Vertices of all searches from a first cone of their own.
 const STARTS: usize = 20_000;
 /// Passes of exchanges over all cones, each of which must gain.
 const PASSES: usize = 24;
+/// The same where another search follows.
+const START_PASSES: usize = 2;
 /// Moves whose columns share one sweep of back-substitutions.
 const TOGETHER: usize = 8;
 
@@ -44,8 +46,18 @@ struct Move {
 impl Placement<'_> {
     /// Moves cones one by one to where they are worth most, anywhere or (`nearby`) uphill from where they are, until none gains more than
     /// `least_gain` of the energy.
-    fn exchange(&mut self, mut choice: Choice, least_gain: f64, nearby: bool) -> Choice {
-        for _ in 0..PASSES {
+    fn exchange(&mut self, choice: Choice, least_gain: f64, nearby: bool) -> Choice {
+        self.exchange_at_most(PASSES, choice, least_gain, nearby)
+    }
+
+    fn exchange_at_most(
+        &mut self,
+        passes: usize,
+        mut choice: Choice,
+        least_gain: f64,
+        nearby: bool,
+    ) -> Choice {
+        for _ in 0..passes {
             let promised = self.promised_moves(&choice, least_gain, nearby);
             let moved = promised
                 .chunks(TOGETHER)
@@ -106,29 +118,47 @@ impl Placement<'_> {
         if count == 0 {
             return self.choose(Vec::new());
         }
-        let mut choice = self.first_choice(count)?;
-        for _ in 0..CYCLES {
+        let mut choice = self.first_choice(count, PASSES)?;
+        let [least, most] = MORE_CONES;
+        let more = |share: f64| ((share * count as f64) as usize).clamp(least, most);
+        let mut more: Vec<usize> = MORE.into_iter().map(more).collect();
+        more.dedup();
+        let mut in_vain = 0;
+        for &extra in more.iter().cycle().take(CYCLES * more.len()) {
             let before = choice.energy;
-            for share in MORE {
-                choice = self.detour(choice, share);
-            }
-            if choice.energy == before {
+            choice = self.detour(choice, extra);
+            in_vain = if choice.energy < before {
+                0
+            } else {
+                in_vain + 1
+            };
+            // What did not help would do the same again.
+            if in_vain == more.len() {
                 break;
             }
         }
         Some(self.exchange(choice, FINE_GAIN, false))
     }
 
-    /// Adds a share more cones, exchanges all, takes away as many, and exchanges what is left; keeps that if it is better.
-    fn detour(&mut self, choice: Choice, share: f64) -> Choice {
+    /// `count` cones for another search to start from.
+    pub(super) fn start(&mut self, count: usize) -> Option<Choice> {
+        self.first_choice(count, START_PASSES)
+    }
+
+    /// Adds more cones, exchanges all, takes away as many, and exchanges what is left; keeps that if it is better.
+    fn detour(&mut self, choice: Choice, more: usize) -> Choice {
         let count = choice.sites.len();
-        let more = ((share * count as f64) as usize).max(LEAST_MORE);
         let many = self.grow(choice.clone(), count + more);
         let many = self.exchange(many, COARSE_GAIN, false);
-        let Some(fewer) = self.prune(many, count) else {
-            return choice;
-        };
-        let other = self.exchange(fewer, COARSE_GAIN, false);
+        let mut other = many;
+        // Never less than half of them at once, and all others in their places before the next leave.
+        while other.sites.len() > count {
+            let fewer = count.max(other.sites.len().div_ceil(2));
+            let Some(fewer) = self.prune(other, fewer) else {
+                return choice;
+            };
+            other = self.exchange(fewer, COARSE_GAIN, false);
+        }
         // Ways that end at the same places differ by rounding.
         match other.energy < choice.energy * (1.0 - ROUNDING) {
             true => other,
@@ -138,7 +168,7 @@ impl Placement<'_> {
 
     /// From nothing to cones that no single move improves much. On a small mesh, where that is cheap, the first cone is put at several places
     /// in turn.
-    fn first_choice(&mut self, count: usize) -> Option<Choice> {
+    fn first_choice(&mut self, count: usize, passes: usize) -> Option<Choice> {
         let starts = (STARTS / self.len().max(1)).min(self.samples.len());
         let step = self.samples.len().div_ceil(starts.max(1)).max(1);
         let firsts = self.samples.iter().copied().step_by(step).take(starts);
@@ -152,7 +182,7 @@ impl Placement<'_> {
                 continue;
             };
             let start = self.grow(start, count);
-            let choice = self.exchange(start, COARSE_GAIN, false);
+            let choice = self.exchange_at_most(passes, start, COARSE_GAIN, false);
             let is_better = |b: &Choice| choice.energy < b.energy * (1.0 - ROUNDING);
             if best.as_ref().is_none_or(is_better) {
                 best = Some(choice);
