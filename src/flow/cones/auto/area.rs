@@ -15,7 +15,9 @@ use rayon::prelude::*;
 /// Points a thread sums in one go; the sums do not depend on the number of threads.
 const PIECE: usize = 4096;
 /// Relative gain of F + 1 below which they are good enough.
-const SETTLED: f64 = 1e-6;
+const SETTLED: f64 = 1e-10;
+/// Gain that a step promises below which rounding hides it, so that it is taken as it is.
+const HIDDEN: f64 = 1e-13;
 
 /// A surface seen at points.
 #[derive(Clone, Copy)]
@@ -211,7 +213,7 @@ impl Points<'_> {
                     let curvature = now.curvature.iter().zip(&best.curvature);
                     let next: Vec<f64> = curvature.map(|(c, d)| c + length * d).collect();
                     let mut next = self.fixed(answers, &next);
-                    if next.value < now.value {
+                    if next.value < now.value || best.energy.abs() < HIDDEN {
                         next.matrix = program.matrix;
                         return Some(next);
                     }
