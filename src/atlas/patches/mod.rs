@@ -16,6 +16,7 @@
 //! a domain that does not.
 
 mod dissolve;
+mod given;
 mod merge;
 mod overlap;
 mod packing;
@@ -37,6 +38,8 @@ use crate::atlas::overlay::Layout;
 use crate::atlas::plane::Similarity;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, PatchId};
 use crate::geometry::mesh::Mesh;
+pub use given::charts_of;
+use rectangle::Oriented;
 pub(crate) use seams::seams;
 use slit::Slit;
 #[cfg(test)]
@@ -250,7 +253,19 @@ pub fn layout(
     }
     let area = |faces: &Vec<FaceId>| faces.iter().map(|&f| slit.source_area[f]).sum();
     let source_area: Vec<f64> = sets.iter().map(area).collect();
-    let rasters = resolution::rasters(&oriented, &source_area, params);
+    let patches = with_images(&oriented, &source_area, params);
+    let seams = seams(mesh, &cut.is_cut, &face_patch, &uv);
+    Ok(PatchLayout {
+        face_patch,
+        uv,
+        patches,
+        seams,
+    })
+}
+
+/// Gives patches their images and their places in the packed square.
+fn with_images(oriented: &[Oriented], source_area: &[f64], params: &PatchParams) -> Vec<Patch> {
+    let rasters = resolution::rasters(oriented, source_area, params);
     // In the packed square every patch has its image's density, on square texels.
     let sizes: Vec<[usize; 2]> = oriented
         .iter()
@@ -265,7 +280,7 @@ pub fn layout(
         .zip(&rasters)
         .map(|(patch, raster)| [raster.density, raster.density * patch.height])
         .collect();
-    let patches = oriented
+    oriented
         .iter()
         .zip(&rasters)
         .zip(packed(&sizes, &contents))
@@ -277,14 +292,7 @@ pub fn layout(
             packed_scale,
             packed_offset,
         })
-        .collect();
-    let seams = seams(mesh, &cut.is_cut, &face_patch, &uv);
-    Ok(PatchLayout {
-        face_patch,
-        uv,
-        patches,
-        seams,
-    })
+        .collect()
 }
 
 /// Places contents (width, height) in the middle of their boxes, packed into a square: the part of the square that a unit of the

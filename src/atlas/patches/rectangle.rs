@@ -73,35 +73,37 @@ impl Frame {
     }
 
     fn orient(self, slit: &Slit, faces: &[FaceId]) -> Oriented {
-        let points = || self.corners.iter().flatten().copied();
-        let angle = best_angle(&convex_hull(outer(points)));
-        let turned = rotation(-angle);
-        let (low, high) = extents(points().map(&turned));
-        let width = high[0] - low[0];
-        // A patch without any extent keeps its coordinates.
-        let width = if width > 0.0 { width } else { 1.0 };
-        let to_patch = |p: [f64; 2]| {
-            let q = turned(p);
-            [(q[0] - low[0]) / width, (q[1] - low[1]) / width]
-        };
-        let uv: Vec<_> = self.corners.iter().map(|t| t.map(to_patch)).collect();
-        let to_frame = Similarity {
+        let flat: f64 = faces.iter().map(|&f| slit.flat_area[f]).sum();
+        let mut oriented = in_rectangle(&self.corners, flat);
+        if self.own {
+            oriented.to_chart = fit(slit, faces, &oriented.uv, oriented.to_chart.scale);
+        }
+        oriented
+    }
+}
+
+/// Triangles of a given total area in the coordinates of their smallest rectangle; `to_chart` leads back.
+pub(super) fn in_rectangle(corners: &[[[f64; 2]; 3]], area: f64) -> Oriented {
+    let points = || corners.iter().flatten().copied();
+    let angle = best_angle(&convex_hull(outer(points)));
+    let turned = rotation(-angle);
+    let (low, high) = extents(points().map(&turned));
+    let width = high[0] - low[0];
+    // A patch without any extent keeps its coordinates.
+    let width = if width > 0.0 { width } else { 1.0 };
+    let to_patch = |p: [f64; 2]| {
+        let q = turned(p);
+        [(q[0] - low[0]) / width, (q[1] - low[1]) / width]
+    };
+    Oriented {
+        uv: corners.iter().map(|t| t.map(to_patch)).collect(),
+        height: (high[1] - low[1]) / width,
+        area: area / (width * width),
+        to_chart: Similarity {
             scale: width,
             rotation: wrap_angle(angle),
             translation: rotate(low, angle),
-        };
-        let to_chart = if self.own {
-            fit(slit, faces, &uv, width)
-        } else {
-            to_frame
-        };
-        let flat: f64 = faces.iter().map(|&f| slit.flat_area[f]).sum();
-        Oriented {
-            uv,
-            height: (high[1] - low[1]) / width,
-            area: flat / (width * width),
-            to_chart,
-        }
+        },
     }
 }
 

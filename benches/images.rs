@@ -1,0 +1,154 @@
+//! How well geometry images hold a surface, at equal total texels: ours in both domains, beside the same sampler on the atlases of other programs.
+//!
+//! `cargo bench --bench images -- [--peers DIR] MESH…`: 128², 256² and 512² texels in all images together, their margins included. DIR holds
+//! `NAME.TOOL.obj`, the mesh with the texture coordinates of a tool, as `benches/peers/atlases.py` writes them. PSNR is
+//! 20 log10(diagonal / symmetric RMS distance) of the mesh that is rebuilt from images and seam samples. Nothing here is timed.
+
+mod common;
+
+use affine_atlas::atlas::geometry_image::{image_origin, sample};
+use affine_atlas::atlas::patches::{Domain, PatchLayout, PatchParams, charts_of};
+use affine_atlas::config::Config;
+use affine_atlas::geometry::deviation::{Sampling, Triangles, deviation};
+use affine_atlas::geometry::ids::{FaceVec, VertexVec};
+use affine_atlas::geometry::mesh::{AttributeKind, Mesh, Soup};
+use affine_atlas::rebuild::{Images, rebuild};
+use affine_atlas::{job, read, repair};
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+const SIDES: [usize; 3] = [128, 256, 512];
+const SAMPLING: Sampling = Sampling {
+    samples: 200_000,
+    vertices: 20_000,
+};
+/// For small budgets: below this a patch asks for more texels than the rest allows.
+const MIN_SIDE: usize = 8;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut peers: Option<PathBuf> = None;
+    let mut meshes: Vec<PathBuf> = Vec::new();
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--peers" => peers = Some(arguments.next().ok_or("--peers needs a folder")?.into()),
+            // What cargo adds.
+            "--bench" => {}
+            _ => meshes.push(argument.into()),
+        }
+    }
+    println!("| model | atlas | patches | 128²: texels, PSNR | 256² | 512² |");
+    println!("| --- | --- | --- | --- | --- | --- |");
+    for path in &meshes {
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        let asset = read::read(path, &Default::default())?;
+        for domain in [Domain::Flat] {
+            let label = match domain {
+                Domain::Flat => "ours, flat",
+                Domain::Rectangle => "ours, rectangle",
+            };
+            row(&name, label, |side| ours(&asset.soup, domain, side));
+        }
+        for tool in ["xatlas", "lscm", "slim"] {
+            let file = format!("{name}.{tool}.obj");
+            let Some(file) = peers.as_ref().map(|p| p.join(file)).filter(|f| f.exists()) else {
+                continue;
+            };
+            let mesh = component(&file)?;
+            row(&name, tool, |side| theirs(&mesh, side));
+        }
+    }
+    Ok(())
+}
+
+/// Patches, texels and PSNR.
+struct Found {
+    patches: usize,
+    texels: usize,
+    psnr: f64,
+}
+
+fn row(name: &str, atlas: &str, of: impl Fn(usize) -> Result<Found, Box<dyn Error>>) {
+    let found = SIDES.map(of);
+    let cells = found.each_ref().map(|found| match found {
+        Ok(f) => format!("{}, {:.2}", f.texels, f.psnr),
+        Err(e) => e.to_string(),
+    });
+    let patches = found.iter().flatten().map(|f| f.patches).max();
+    let patches = patches.unwrap_or(0);
+    println!("| {name} | {atlas} | {patches} | {} |", cells.join(" | "));
+}
+
+fn ours(soup: &Soup, domain: Domain, side: usize) -> Result<Found, Box<dyn Error>> {
+    let mut config = Config::default();
+    config.images.domain = domain;
+    config.patches.texel_budget = side * side;
+    config.patches.min_side = MIN_SIDE;
+    if let Ok(r) = std::env::var("RANGE") { config.patches.log_scale_range = r.parse()?; }
+    let atlas = job::build(soup, &config, &())?.swap_remove(0)?;
+    let images = Images::new(&atlas.patches, &atlas.images, atlas.image_origin);
+    measure(&component_of(soup)?, &atlas.patches, &images)
+}
+
+/// The surface sampled over given charts, by the sampler of our own.
+fn theirs(mesh: &Mesh, side: usize) -> Result<Found, Box<dyn Error>> {
+    let set = mesh
+        .attributes
+        .iter()
+        .find(|a| a.kind == AttributeKind::TexCoord(0))
+        .ok_or("no texture coordinates")?;
+    let faces = mesh.connectivity.faces();
+    let uv: FaceVec<[[f64; 2]; 3]> = faces
+        .map(|f| {
+            std::array::from_fn(|k| {
+                let uv = set.corner(f.index(), k);
+                [f64::from(uv[0]), -f64::from(uv[1])]
+            })
+        })
+        .collect();
+    let params = PatchParams {
+        texel_budget: side * side,
+        min_side: MIN_SIDE,
+        ..PatchParams::default()
+    };
+    let layout = charts_of(mesh, &uv, &params)?;
+    let log_scale = VertexVec::filled(0.0, mesh.connectivity.vertex_count());
+    let origin = image_origin(mesh);
+    let images = sample(mesh, &layout, &log_scale, origin);
+    measure(mesh, &layout, &Images::new(&layout, &images, origin))
+}
+
+fn measure(
+    source: &Mesh,
+    layout: &PatchLayout,
+    images: &Images,
+) -> Result<Found, Box<dyn Error>> {
+    let rebuilt = rebuild(images)?;
+    let faces = source.connectivity.to_faces();
+    let given = Triangles {
+        positions: source.positions.as_slice(),
+        faces: &faces,
+    };
+    let made = Triangles {
+        positions: &rebuilt.positions,
+        faces: &rebuilt.faces,
+    };
+    let covered: f64 = images.patches.iter().map(|p| p.alpha.iter().map(|a| f64::from(*a)).sum::<f64>()).sum();
+    let all: usize = layout.patches.iter().map(|p| p.width * p.height).sum();
+    eprint!("{:.3} ", covered / all as f64);
+    let found = deviation(given, made, SAMPLING).ok_or("no area")?;
+    Ok(Found {
+        patches: layout.patches.len(),
+        texels: layout.patches.iter().map(|p| p.width * p.height).sum(),
+        psnr: found.psnr(source.diagonal()).unwrap_or(f64::INFINITY),
+    })
+}
+
+fn component(file: &Path) -> Result<Mesh, Box<dyn Error>> {
+    component_of(&read::read(file, &Default::default())?.soup)
+}
+
+fn component_of(soup: &Soup) -> Result<Mesh, Box<dyn Error>> {
+    let mut repaired = repair::repair(soup, &Default::default())?;
+    Ok(repaired.components.swap_remove(0).mesh?)
+}
