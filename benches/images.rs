@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for path in &meshes {
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
         let asset = read::read(path, &Default::default())?;
-        for domain in [Domain::Flat] {
+        for domain in [Domain::Flat, Domain::Rectangle] {
             let label = match domain {
                 Domain::Flat => "ours, flat",
                 Domain::Rectangle => "ours, rectangle",
@@ -84,7 +84,6 @@ fn ours(soup: &Soup, domain: Domain, side: usize) -> Result<Found, Box<dyn Error
     config.images.domain = domain;
     config.patches.texel_budget = side * side;
     config.patches.min_side = MIN_SIDE;
-    if let Ok(r) = std::env::var("RANGE") { config.patches.log_scale_range = r.parse()?; }
     let atlas = job::build(soup, &config, &())?.swap_remove(0)?;
     let images = Images::new(&atlas.patches, &atlas.images, atlas.image_origin);
     measure(&component_of(soup)?, &atlas.patches, &images)
@@ -118,11 +117,7 @@ fn theirs(mesh: &Mesh, side: usize) -> Result<Found, Box<dyn Error>> {
     measure(mesh, &layout, &Images::new(&layout, &images, origin))
 }
 
-fn measure(
-    source: &Mesh,
-    layout: &PatchLayout,
-    images: &Images,
-) -> Result<Found, Box<dyn Error>> {
+fn measure(source: &Mesh, layout: &PatchLayout, images: &Images) -> Result<Found, Box<dyn Error>> {
     let rebuilt = rebuild(images)?;
     let faces = source.connectivity.to_faces();
     let given = Triangles {
@@ -133,9 +128,6 @@ fn measure(
         positions: &rebuilt.positions,
         faces: &rebuilt.faces,
     };
-    let covered: f64 = images.patches.iter().map(|p| p.alpha.iter().map(|a| f64::from(*a)).sum::<f64>()).sum();
-    let all: usize = layout.patches.iter().map(|p| p.width * p.height).sum();
-    eprint!("{:.3} ", covered / all as f64);
     let found = deviation(given, made, SAMPLING).ok_or("no area")?;
     Ok(Found {
         patches: layout.patches.len(),

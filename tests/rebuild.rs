@@ -139,6 +139,7 @@ fn measure(atlas: &AffineAtlas, soup: &Soup, side: usize) -> Result<[f64; 3], Fa
         &atlas.cut,
         &atlas.central,
         None,
+        Domain::Flat,
         &params,
     )?;
     let scale = &atlas.metric.log_scale;

@@ -364,6 +364,7 @@ mod tests {
             &sample.cut,
             &sample.development,
             None,
+            Domain::Flat,
             &PatchParams::default(),
         )
         .unwrap();
@@ -445,7 +446,16 @@ mod tests {
             texel_budget: 10_000,
             ..PatchParams::default()
         };
-        let layout = layout(&s.mesh, &s.length, &s.cut, &s.development, None, &params).unwrap();
+        let layout = layout(
+            &s.mesh,
+            &s.length,
+            &s.cut,
+            &s.development,
+            None,
+            Domain::Flat,
+            &params,
+        )
+        .unwrap();
         let images = sample(&s.mesh, &layout, &s.log_scale, [0.0; 3]);
         let c = &s.mesh.connectivity;
         let mut located = 0;

@@ -115,6 +115,7 @@ fn build_component(
         &cut,
         &central,
         under,
+        config.images.domain,
         &config.patches,
     )?;
     let surface = Charted {

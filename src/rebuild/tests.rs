@@ -3,7 +3,7 @@
 use super::*;
 use crate::atlas::geometry_image::{image_origin, sample};
 use crate::atlas::patches::samples::{self, Sample, build};
-use crate::atlas::patches::{PatchParams, layout};
+use crate::atlas::patches::{Domain, PatchParams, layout};
 use crate::atlas::plane::doubled_area;
 use crate::geometry::deviation::{Sampling, Triangles, deviation};
 use crate::geometry::mesh::distance;
@@ -22,7 +22,16 @@ fn lay(s: &Sample, texels: usize) -> Laid {
         min_side: 1,
         ..PatchParams::default()
     };
-    let layout = layout(&s.mesh, &s.length, &s.cut, &s.development, None, &params).unwrap();
+    let layout = layout(
+        &s.mesh,
+        &s.length,
+        &s.cut,
+        &s.development,
+        None,
+        Domain::Flat,
+        &params,
+    )
+    .unwrap();
     let origin = image_origin(&s.mesh);
     let images = sample(&s.mesh, &layout, &s.log_scale, origin);
     Laid {

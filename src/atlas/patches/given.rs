@@ -6,6 +6,7 @@
 //! compared. Parts with holes are slit open, because a patch's border is one chain. *Not guaranteed:* that a patch is injective, or of any quality:
 //! it is what was given.
 
+use super::demand::Sums;
 use super::rectangle::in_rectangle;
 use super::{PatchError, PatchLayout, PatchParams, seams, with_images};
 use crate::atlas::cut::slit_copies;
@@ -61,7 +62,7 @@ pub fn charts_of(
     let mut face_patch = FaceVec::filled(PatchId::new(0), c.face_count());
     let mut placed = FaceVec::filled([[0.0; 2]; 3], c.face_count());
     let mut oriented = Vec::with_capacity(sets.len());
-    let mut source_area = Vec::with_capacity(sets.len());
+    let mut sums = Vec::with_capacity(sets.len());
     for (i, faces) in sets.iter().enumerate() {
         let mut corners: Vec<[[f64; 2]; 3]> = faces.iter().map(|&f| uv[f]).collect();
         let mut area: f64 = corners.iter().map(|&t| 0.5 * doubled_area(t)).sum();
@@ -75,11 +76,16 @@ pub fn charts_of(
             placed[f] = corners;
         }
         oriented.push(patch);
-        let area = |&f: &FaceId| triangle_area(mesh.face_positions(f));
-        source_area.push(faces.iter().map(area).sum());
+        let in_space = |&f: &FaceId| triangle_area(mesh.face_positions(f));
+        // Nothing is known to bend: texels are spread evenly over the surface.
+        sums.push(Sums {
+            area: faces.iter().map(in_space).sum(),
+            flat: area,
+            bend: [0.0; 2],
+        });
     }
     open_holes(mesh, &mut is_cut);
-    let patches = with_images(&oriented, &source_area, params);
+    let patches = with_images(&oriented, &sums, params);
     let seams = seams(mesh, &is_cut, &face_patch, &placed);
     Ok(PatchLayout {
         face_patch,
@@ -140,7 +146,10 @@ fn open_holes(mesh: &Mesh, is_cut: &mut EdgeVec<bool>) {
             }
         }
     }
-    bridges.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2, a.3).cmp(&(b.1, b.2, b.3))));
+    bridges.sort_by(|a, b| {
+        a.0.total_cmp(&b.0)
+            .then((a.1, a.2, a.3).cmp(&(b.1, b.2, b.3)))
+    });
     for (_, v, w, e) in bridges {
         if !borders.join(origin[v], origin[w]) {
             continue;
@@ -153,5 +162,87 @@ fn open_holes(mesh: &Mesh, is_cut: &mut EdgeVec<bool>) {
                 at = before;
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::samples::{build, ramp};
+    use super::super::{Domain, layout};
+    use super::*;
+    use crate::atlas::geometry_image::{image_origin, sample};
+    use crate::rebuild::{Images, rebuild};
+    use std::collections::BTreeSet;
+
+    /// A flat ring of eight squares around a hole.
+    #[test]
+    fn a_chart_with_a_hole_is_slit_open() {
+        let at = |i: u32, j: u32| 4 * i + j;
+        let place = |v: u32| [f64::from(v / 4), f64::from(v % 4)];
+        let mut faces = Vec::new();
+        for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+            if (i, j) != (1, 1) {
+                let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+                faces.extend([[a, b, c], [a, c, d]]);
+            }
+        }
+        let positions = (0..16).map(|v| [place(v)[0], place(v)[1], 0.0]).collect();
+        // Mirrored, as some programs have it.
+        let uv: Vec<_> = faces
+            .iter()
+            .map(|f| f.map(|v| [-place(v)[0], place(v)[1]]))
+            .collect();
+        let s = build(&faces, positions, uv.clone(), |_, _| false, [0.0; 2]);
+        let layout = charts_of(&s.mesh, &uv.into(), &PatchParams::default()).unwrap();
+        assert_eq!(layout.patches.len(), 1);
+        let origin = image_origin(&s.mesh);
+        let images = sample(&s.mesh, &layout, &s.log_scale, origin);
+        let rebuilt = rebuild(&Images::new(&layout, &images, origin)).unwrap();
+        rebuilt.expect_topology(0, 0, 2).unwrap();
+    }
+
+    #[test]
+    fn coordinates_of_patches_give_the_same_patches() {
+        let s = ramp(60, 12, 5.0);
+        let params = PatchParams::default();
+        let development = &s.development;
+        let ours = layout(
+            &s.mesh,
+            &s.length,
+            &s.cut,
+            development,
+            None,
+            Domain::Flat,
+            &params,
+        );
+        let ours = ours.unwrap();
+        // Apart from each other, since all lie in [0, 1].
+        let mut uv = ours.uv.clone();
+        for f in s.mesh.connectivity.faces() {
+            let patch = ours.face_patch[f].index();
+            uv[f].iter_mut().for_each(|p| p[0] += 2.0 * patch as f64);
+        }
+        let found = charts_of(&s.mesh, &uv, &params).unwrap();
+        let faces = s.mesh.connectivity.faces();
+        let pairs: BTreeSet<_> = faces
+            .map(|f| (ours.face_patch[f], found.face_patch[f]))
+            .collect();
+        assert!(ours.patches.len() > 1);
+        assert_eq!(
+            (pairs.len(), found.patches.len()),
+            (ours.patches.len(), ours.patches.len())
+        );
+    }
+
+    #[test]
+    fn coordinates_must_be_numbers() {
+        let s = ramp(2, 2, 1.0);
+        let mut uv: FaceVec<_> = s.mesh.connectivity.faces().map(|_| [[0.0; 2]; 3]).collect();
+        uv[FaceId::new(3)][1][0] = f64::NAN;
+        let refused = charts_of(&s.mesh, &uv, &PatchParams::default());
+        assert!(matches!(
+            refused,
+            Err(PatchError::NotFinite { face: 3, .. })
+        ));
     }
 }

@@ -15,7 +15,9 @@
 //! The tutorial has no patches: it shows one chart that overlaps itself (Fig. 19d). A geometry image needs
 //! a domain that does not.
 
+mod demand;
 mod dissolve;
+mod divide;
 mod given;
 mod merge;
 mod overlap;
@@ -36,8 +38,9 @@ use crate::atlas::cut::CutGraph;
 use crate::atlas::develop::{Development, Unfolded};
 use crate::atlas::overlay::Layout;
 use crate::atlas::plane::Similarity;
-use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, PatchId};
+use crate::geometry::ids::{EdgeVec, FaceVec, PatchId};
 use crate::geometry::mesh::Mesh;
+use demand::Sums;
 pub use given::charts_of;
 use rectangle::Oriented;
 pub(crate) use seams::seams;
@@ -213,7 +216,8 @@ impl PatchParams {
 /// finds the seams.
 ///
 /// `length` holds the flat length of every edge, `development` the central chart of the disk that `cut` makes, `under`
-/// the layout that carries them, where there is one: own coordinates of patches are developed from there.
+/// the layout that carries them, where there is one: own coordinates of patches are developed from there. `domain` is what
+/// the patches are for: images of their own, or a division into rectangles.
 ///
 /// # Errors
 /// A parameter out of range, or coordinates and lengths that are not finite.
@@ -223,6 +227,7 @@ pub fn layout(
     cut: &CutGraph,
     development: &Development,
     under: Option<(&Layout, &Unfolded)>,
+    domain: Domain,
     params: &PatchParams,
 ) -> Result<PatchLayout, PatchError> {
     params.validate()?;
@@ -239,9 +244,14 @@ pub fn layout(
     }
     let slit = Slit::new(mesh, length, cut, development, under);
     let sets = segment::segment(&slit, params.log_scale_range);
+    let mut own = vec![[0.0; 2]; development.copies];
+    let sets = match domain {
+        Domain::Flat => divide::divide(&slit, sets, params, &mut own),
+        // Every side of a patch is a rectangle more.
+        Domain::Rectangle => sets,
+    };
     let mut face_patch = FaceVec::filled(PatchId::new(0), c.face_count());
     let mut uv = FaceVec::filled([[0.0; 2]; 3], c.face_count());
-    let mut own = vec![[0.0; 2]; development.copies];
     let mut oriented = Vec::with_capacity(sets.len());
     for (i, faces) in sets.iter().enumerate() {
         let patch = rectangle::orient(&slit, faces, &mut own);
@@ -251,9 +261,8 @@ pub fn layout(
         }
         oriented.push(patch);
     }
-    let area = |faces: &Vec<FaceId>| faces.iter().map(|&f| slit.source_area[f]).sum();
-    let source_area: Vec<f64> = sets.iter().map(area).collect();
-    let patches = with_images(&oriented, &source_area, params);
+    let sums = divide::sums(&slit, &sets, params);
+    let patches = with_images(&oriented, &sums, params);
     let seams = seams(mesh, &cut.is_cut, &face_patch, &uv);
     Ok(PatchLayout {
         face_patch,
@@ -264,8 +273,8 @@ pub fn layout(
 }
 
 /// Gives patches their images and their places in the packed square.
-fn with_images(oriented: &[Oriented], source_area: &[f64], params: &PatchParams) -> Vec<Patch> {
-    let rasters = resolution::rasters(oriented, source_area, params);
+fn with_images(oriented: &[Oriented], sums: &[Sums], params: &PatchParams) -> Vec<Patch> {
+    let rasters = resolution::rasters(oriented, sums, params);
     // In the packed square every patch has its image's density, on square texels.
     let sizes: Vec<[usize; 2]> = oriented
         .iter()

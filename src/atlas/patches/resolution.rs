@@ -1,6 +1,7 @@
-//! How many texels each patch gets: in proportion to its area in space, so that the surface is sampled
-//! evenly, with a floor so that no patch is too coarse to be of use.
+//! How many texels each patch gets: as its [demand](super::demand) says, so that the error is as small as the budget lets it be, with a floor so
+//! that no patch is too coarse to be of use.
 
+use super::demand::{self, Demand, Sums};
 use super::raster::{cover, to_texel};
 use super::rectangle::Oriented;
 use super::{MAX_SIDE, PatchParams};
@@ -29,24 +30,28 @@ pub(super) struct Raster {
     pub margin: f64,
 }
 
-/// Rasters of all patches; `source_area` is theirs in space.
-pub(super) fn rasters(
-    patches: &[Oriented],
-    source_area: &[f64],
-    params: &PatchParams,
-) -> Vec<Raster> {
+/// Rasters of all patches; `sums` are their areas and bends.
+pub(super) fn rasters(patches: &[Oriented], sums: &[Sums], params: &PatchParams) -> Vec<Raster> {
     let margin = (params.padding as f64).max(0.5);
     let most = (MAX_SIDE - 2 * params.padding.max(1)) as f64;
-    let floors: Vec<f64> = patches
+    let demand = |(patch, sums): (&Oriented, &Sums)| {
+        let width = patch.to_chart.scale;
+        let sides = [width, width * patch.height];
+        Demand { sums: *sums, sides }
+    };
+    let demands: Vec<Demand> = patches.iter().zip(sums).map(demand).collect();
+    let coarsest: Vec<f64> = patches
         .iter()
-        .map(|p| least_density(p, params, most))
+        .map(|p| p.to_chart.scale / least_density(p, params, most))
         .collect();
-    let budget = params.texel_budget as f64;
-    let densities = balance(patches, source_area, &floors, margin, budget);
+    let budget = demand::budget(&demands, &coarsest, params);
+    let texels = demands.iter().zip(&coarsest);
+    let texels = texels.map(|(demand, &coarsest)| demand.texel(&budget).min(coarsest));
     patches
         .iter()
-        .zip(densities)
-        .map(|(patch, density)| {
+        .zip(texels)
+        .map(|(patch, texel)| {
+            let density = patch.to_chart.scale / texel;
             // Whole texels on the longer side. Half a texel off a floor there is no tie.
             let mut columns = (density.min(most) + 0.5).floor().max(1.0);
             loop {
@@ -70,42 +75,6 @@ fn least_density(patch: &Oriented, params: &PatchParams, most: f64) -> f64 {
         .max(short_side.min(ENOUGH_LONG_SIDE))
         .max(area.min(ENOUGH_LONG_SIDE))
         .min(most)
-}
-
-/// Texels a unit of u for each patch: one number of texels an area in space, so large that all images, margins
-/// included, together hold the budget, where the floors leave any choice.
-fn balance(
-    patches: &[Oriented],
-    source_area: &[f64],
-    floors: &[f64],
-    margin: f64,
-    budget: f64,
-) -> Vec<f64> {
-    let total_area: f64 = source_area.iter().sum();
-    let densities = |texels: f64| -> Vec<f64> {
-        let rows = patches.iter().zip(source_area).zip(floors);
-        rows.map(|((patch, area), &floor)| {
-            let inside = texels * area / total_area.max(f64::MIN_POSITIVE);
-            floor.max((inside / patch.area.max(f64::MIN_POSITIVE)).sqrt())
-        })
-        .collect()
-    };
-    let total = |densities: &[f64]| -> f64 {
-        let rows = densities.iter().zip(patches);
-        rows.map(|(d, p)| (d + 2.0 * margin) * (d * p.height + 2.0 * margin))
-            .sum()
-    };
-    // A patch never fills more than its rectangle, so the answer lies in [0, budget].
-    let (mut low, mut high) = (0.0, budget);
-    for _ in 0..100 {
-        let middle = 0.5 * (low + high);
-        if total(&densities(middle)) > budget {
-            high = middle;
-        } else {
-            low = middle;
-        }
-    }
-    densities(low)
 }
 
 /// Square texels, `columns` of them on the patch's width; its height in the middle of the rows.
@@ -174,14 +143,20 @@ mod tests {
         }
     }
 
+    /// Nothing bends.
+    fn even(area: f64, flat: f64) -> Sums {
+        let bend = [0.0; 2];
+        Sums { area, flat, bend }
+    }
+
     #[test]
     fn one_square_patch_gets_the_budget() {
         let params = PatchParams::default();
-        let r = rasters(&[rectangle(1.0)], &[1.0], &params);
+        let r = rasters(&[rectangle(1.0)], &[even(1.0, 1.0)], &params);
         assert_eq!((r[0].width, r[0].height), (512, 512));
         // The same up to the last digits.
         for height in [1.0 - 1e-11, 1.0 + 1e-11] {
-            let near = rasters(&[rectangle(height)], &[3.0], &params);
+            let near = rasters(&[rectangle(height)], &[even(3.0, height)], &params);
             assert_eq!((near[0].width, near[0].height), (512, 512));
         }
     }
@@ -195,7 +170,9 @@ mod tests {
             rectangle(0.25),
             rectangle(1.0),
         ];
-        let r = rasters(&patches, &[4.0, 1.0, 1.0, 1e-9], &params);
+        let areas = [4.0, 1.0, 1.0, 1e-9];
+        let sums = [0, 1, 2, 3].map(|i| even(areas[i], patches[i].height));
+        let r = rasters(&patches, &sums, &params);
         let inside = |i: usize| r[i].density * r[i].density * patches[i].height;
         assert!((inside(0) / inside(1) / 4.0 - 1.0).abs() < 0.02);
         assert!((inside(1) / inside(2) - 1.0).abs() < 0.02);
@@ -214,7 +191,7 @@ mod tests {
             };
             for height in [1.0, 0.3, 0.01, 1e-5, 1e-9, 0.0] {
                 let patch = rectangle(height);
-                let r = &rasters(&[rectangle(height)], &[1.0], &params)[0];
+                let r = &rasters(&[rectangle(height)], &[even(1.0, height)], &params)[0];
                 for p in patch.uv.iter().flatten() {
                     let [x, y] = to_texel(&r.texel_to_patch, *p);
                     let margin = (padding as f64).max(0.5) - 1e-5;

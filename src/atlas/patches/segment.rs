@@ -118,13 +118,7 @@ pub(super) fn place<'a>(
 
 /// Divides the slit disk; every face is in exactly one set. `range` bounds the regional log scale of each.
 pub(super) fn segment(slit: &Slit, range: f64) -> Vec<Vec<FaceId>> {
-    let mut sets = Sets {
-        slit,
-        stamp: FaceVec::filled(0, slit.connectivity.face_count()),
-        copy_stamp: vec![0; slit.development.copies],
-        sides: FaceVec::filled(0, slit.connectivity.face_count()),
-        last: 0,
-    };
+    let mut sets = Sets::new(slit);
     let total: f64 = slit.source_area.iter().sum();
     let mut own = vec![[0.0; 2]; slit.development.copies];
     let mut queue = BinaryHeap::new();
@@ -281,7 +275,7 @@ fn best_window(slit: &Slit, sorted: &[FaceId], range: f64) -> [f64; 2] {
 }
 
 /// Sets of faces as stamps, so that membership costs one comparison and nothing is cleared.
-struct Sets<'a> {
+pub(super) struct Sets<'a> {
     slit: &'a Slit<'a>,
     stamp: FaceVec<u32>,
     /// The same for copies.
@@ -291,9 +285,24 @@ struct Sets<'a> {
     last: u32,
 }
 
-impl Sets<'_> {
+impl<'a> Sets<'a> {
+    pub(super) fn new(slit: &'a Slit<'a>) -> Self {
+        Self {
+            slit,
+            stamp: FaceVec::filled(0, slit.connectivity.face_count()),
+            copy_stamp: vec![0; slit.development.copies],
+            sides: FaceVec::filled(0, slit.connectivity.face_count()),
+            last: 0,
+        }
+    }
+
+    /// True where a face has this stamp.
+    pub(super) fn has(&self, f: FaceId, stamp: u32) -> bool {
+        self.stamp[f] == stamp
+    }
+
     /// Marks the faces with a new stamp.
-    fn mark(&mut self, faces: &[FaceId]) -> u32 {
+    pub(super) fn mark(&mut self, faces: &[FaceId]) -> u32 {
         self.last += 1;
         for &f in faces {
             self.stamp[f] = self.last;
@@ -316,7 +325,7 @@ impl Sets<'_> {
     }
 
     /// Connected components on the slit disk, each in the order given, by their first face.
-    fn components(&mut self, faces: &[FaceId]) -> Vec<Vec<FaceId>> {
+    pub(super) fn components(&mut self, faces: &[FaceId]) -> Vec<Vec<FaceId>> {
         let set = self.mark(faces);
         let first_component = self.last + 1;
         let mut components: Vec<Vec<FaceId>> = Vec::new();
@@ -421,7 +430,7 @@ fn grow(
 }
 
 /// Cuts a connected injective set into disks along straight lines through its holes.
-fn split_at_holes(
+pub(super) fn split_at_holes(
     sets: &mut Sets,
     faces: Vec<FaceId>,
     placement: &Placement,

@@ -5,7 +5,7 @@ use super::samples::{self, Sample, build, ramp, square, strip};
 use super::*;
 use crate::atlas::geometry_image::{GeometryImage, image_origin, sample};
 use crate::atlas::plane::{distance, doubled_area};
-use crate::geometry::ids::VertexId;
+use crate::geometry::ids::{FaceId, VertexId};
 use crate::geometry::mesh::norm;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
@@ -42,7 +42,16 @@ struct Checked {
 
 /// Lays out and samples, and checks everything that holds for every input.
 fn check(s: &Sample, params: &PatchParams) -> Checked {
-    let layout = layout(&s.mesh, &s.length, &s.cut, &s.development, None, params).unwrap();
+    let layout = layout(
+        &s.mesh,
+        &s.length,
+        &s.cut,
+        &s.development,
+        None,
+        Domain::Flat,
+        params,
+    )
+    .unwrap();
     let images = sample(&s.mesh, &layout, &s.log_scale, image_origin(&s.mesh));
     let mut faces = vec![Vec::new(); layout.patches.len()];
     for (f, p) in layout.face_patch.enumerate() {
@@ -514,7 +523,16 @@ fn units_and_last_digits_change_nothing() {
     ];
     for make in make {
         let run = |s: &Sample| {
-            layout(&s.mesh, &s.length, &s.cut, &s.development, None, &params()).unwrap()
+            layout(
+                &s.mesh,
+                &s.length,
+                &s.cut,
+                &s.development,
+                None,
+                Domain::Flat,
+                &params(),
+            )
+            .unwrap()
         };
         let reference = run(&make());
         for scale in [1.0, 1e-3, 1e3, 1e6] {
@@ -538,8 +556,17 @@ fn units_and_last_digits_change_nothing() {
 #[test]
 fn bad_parameters_and_numbers_are_refused() {
     let mut s = square(2);
-    let run =
-        |s: &Sample, p: &PatchParams| layout(&s.mesh, &s.length, &s.cut, &s.development, None, p);
+    let run = |s: &Sample, p: &PatchParams| {
+        layout(
+            &s.mesh,
+            &s.length,
+            &s.cut,
+            &s.development,
+            None,
+            Domain::Flat,
+            p,
+        )
+    };
     for bad in [
         PatchParams {
             log_scale_range: f64::NAN,
