@@ -14,9 +14,9 @@ use super::demand::{self, Budget, Demand, Sums};
 use super::rectangle::in_rectangle;
 use super::segment::{Placement, Sets, centroid, place, rounded_ln, split_at_holes};
 use super::slit::Slit;
-use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, HalfedgeId};
+use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, FaceVec, HalfedgeId, NONE};
 use crate::geometry::mesh::{cross, norm, sub};
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 use std::collections::VecDeque;
 
@@ -47,8 +47,12 @@ struct Divider<'a> {
     budget: Budget,
     /// Texels that an image has on its longer side at the least.
     min_side: f64,
+    /// Areas of every face, and the bend of its edges, half of which belongs to the face on the other side.
+    faces: FaceVec<Sums>,
     /// θ² L, and that over a.
     bend: EdgeVec<[f64; 2]>,
+    /// Scratch space of [`Divider::by_creases`].
+    label: FaceVec<u32>,
     is_crease: EdgeVec<bool>,
 }
 
@@ -163,12 +167,16 @@ pub(super) fn sums(slit: &Slit, patches: &[Vec<FaceId>], params: &PatchParams) -
 impl<'a> Divider<'a> {
     fn new(slit: &'a Slit<'a>, params: &PatchParams) -> Self {
         let (bend, is_crease) = bends(slit);
+        let faces = slit.connectivity.faces();
+        let faces = faces.map(|f| of_face(slit, &bend, f, |_| true)).collect();
         Self {
             sets: Sets::new(slit),
             slit,
             budget: Budget::default(),
             min_side: params.min_side as f64,
+            faces,
             bend,
+            label: FaceVec::filled(NONE, slit.connectivity.face_count()),
             is_crease,
         }
     }
@@ -184,8 +192,8 @@ impl<'a> Divider<'a> {
         let highest = faces.iter().map(|&f| slit.log_scale[f]);
         let highest = highest.fold(f64::NEG_INFINITY, f64::max);
         let root = faces.iter().copied().min().unwrap_or(FaceId::new(0));
-        let set: FxHashSet<FaceId> = faces.iter().copied().collect();
-        let member = |f: FaceId| set.contains(&f);
+        let stamp = self.sets.mark(faces);
+        let member = |f: FaceId| self.sets.has(f, stamp);
         let placement = place(slit, faces.iter().copied(), root, highest, member, own);
         then(self, &placement)
     }
@@ -197,23 +205,29 @@ impl<'a> Divider<'a> {
             let now = divider.cost(&demand);
             let mut tried = vec![divider.by_creases(faces)];
             tried.extend(divider.by_lines(faces, placement, angle));
-            let mut best: Option<(i64, Division)> = None;
+            let mut found: Vec<(i64, Division)> = Vec::new();
             for sides in tried {
-                let Some(division) = divider.in_parts(sides, now, placement) else {
-                    continue;
-                };
-                let share = division.saved / now.max(f64::MIN_POSITIVE);
-                let more = division.parts.len() as f64 - 1.0;
-                let key = (share / more * 1e9) as i64;
-                if key > 0 && best.as_ref().is_none_or(|b| key > b.0) {
-                    best = Some((key, division));
-                }
+                let division = divider.in_parts(sides, now, placement);
+                found.extend(division.map(|division| {
+                    let share = division.saved / now.max(f64::MIN_POSITIVE);
+                    let more = division.parts.len() as f64 - 1.0;
+                    (-(share / more * 1e9) as i64, division)
+                }));
             }
-            best.map(|b| b.1)
+            // Stable: of equals the first.
+            found.sort_by_key(|f| f.0);
+            let mut found = found.into_iter().map(|f| f.1);
+            found.find(|division| {
+                division.parts.iter().all(|faces| {
+                    let positions = placement.positions;
+                    let own = Placement::new(divider.slit, positions, faces.iter().copied());
+                    own.is_injective(divider.slit, faces)
+                })
+            })
         })
     }
 
-    /// The parts of several sides that are disks; `None` where there is one part only, or one that is not injective at its own extent.
+    /// The parts of several sides that are disks; `None` where there is one part only, or they cost more.
     fn in_parts(
         &mut self,
         sides: Vec<Vec<FaceId>>,
@@ -234,7 +248,7 @@ impl<'a> Divider<'a> {
             let own = Placement::new(self.slit, placement.positions, faces.iter().copied());
             let (demand, _) = self.demand(faces, &own);
             saved -= self.cost(&demand);
-            if saved <= 0.0 || !own.is_injective(self.slit, faces) {
+            if saved <= 0.0 {
                 return None;
             }
         }
@@ -251,7 +265,7 @@ impl<'a> Divider<'a> {
                 let other = slit.across(*h).map(|t| slit.connectivity.face(t));
                 other.is_some_and(|g| self.sets.has(g, stamp))
             };
-            sums = sums.and(self.of_face(f, inner));
+            sums = sums.and(of_face(slit, &self.bend, f, inner));
         }
         sums
     }
@@ -281,26 +295,7 @@ impl<'a> Divider<'a> {
         if cost.is_finite() { cost } else { 0.0 }
     }
 
-    fn of_face(&self, f: FaceId, counts: impl Fn(&HalfedgeId) -> bool) -> Sums {
-        let slit = self.slit;
-        let shrunk = (-slit.log_scale[f]).exp();
-        let mut bend = [0.0; 2];
-        for h in slit.connectivity.face_halfedges(f) {
-            if counts(&h) {
-                // Half of it belongs to the face on the other side.
-                let [crease, bent] = self.bend[slit.connectivity.edge(h)];
-                bend[0] += 0.5 * crease * shrunk.powi(3);
-                bend[1] += 0.5 * bent * shrunk.powi(4);
-            }
-        }
-        Sums {
-            area: slit.source_area[f],
-            flat: slit.flat_area[f],
-            bend,
-        }
-    }
-
-    /// Parts between creases; crumbs belong to the part that is fewest faces away. One part where creases enclose nothing large.
+    /// Parts between creases; crumbs belong to the part that is fewest faces away. None where creases enclose nothing large.
     fn by_creases(&mut self, faces: &[FaceId]) -> Vec<Vec<FaceId>> {
         let slit = self.slit;
         let c = slit.connectivity;
@@ -311,58 +306,54 @@ impl<'a> Divider<'a> {
                 g.filter(|&g| sets.has(g, stamp)).map(|g| (g, c.edge(h)))
             })
         };
-        let mut label: FxHashMap<FaceId, usize> = FxHashMap::default();
-        let mut parts: Vec<Vec<FaceId>> = Vec::new();
+        let mut parts: Vec<(Vec<FaceId>, f64)> = Vec::new();
+        faces.iter().for_each(|&f| self.label[f] = NONE);
         for &first in faces {
-            if label.contains_key(&first) {
+            if self.label[first] != NONE {
                 continue;
             }
-            label.insert(first, parts.len());
-            let mut part = vec![first];
+            self.label[first] = 0;
+            let (mut part, mut area) = (vec![first], 0.0);
             let mut next = 0;
             while let Some(&f) = part.get(next) {
                 next += 1;
+                area += slit.source_area[f];
                 for (g, e) in beside(&self.sets, f).into_iter().flatten() {
-                    if !self.is_crease[e] && !label.contains_key(&g) {
-                        label.insert(g, parts.len());
+                    if !self.is_crease[e] && self.label[g] == NONE {
+                        self.label[g] = 0;
                         part.push(g);
                     }
                 }
             }
-            parts.push(part);
+            parts.push((part, area));
         }
-        let area = |part: &[FaceId]| part.iter().map(|&f| slit.source_area[f]).sum::<f64>();
-        let least = CRUMB * area(faces);
-        parts.retain(|part| area(part) >= least);
+        let least = CRUMB * parts.iter().map(|part| part.1).sum::<f64>();
+        parts.retain(|part| part.1 >= least);
         if parts.len() < 2 {
-            return parts;
+            return Vec::new();
         }
-        let mut taken: FxHashSet<FaceId> = parts.iter().flatten().copied().collect();
-        let mut queue: VecDeque<(FaceId, usize)> = VecDeque::new();
-        for (i, part) in parts.iter().enumerate() {
-            queue.extend(part.iter().map(|&f| (f, i)));
+        faces.iter().for_each(|&f| self.label[f] = NONE);
+        let mut queue: VecDeque<FaceId> = VecDeque::new();
+        for (own, (part, _)) in (0u32..).zip(&parts) {
+            part.iter().for_each(|&f| self.label[f] = own);
+            queue.extend(part);
         }
-        while let Some((f, i)) = queue.pop_front() {
+        while let Some(f) = queue.pop_front() {
             for (g, _) in beside(&self.sets, f).into_iter().flatten() {
-                if taken.insert(g) {
-                    parts[i].push(g);
-                    queue.push_back((g, i));
+                if self.label[g] == NONE {
+                    self.label[g] = self.label[f];
+                    queue.push_back(g);
                 }
             }
         }
         // In the order given, as all sets of faces are.
-        let mut owner: FxHashMap<FaceId, usize> = FxHashMap::default();
-        for (i, part) in parts.iter_mut().enumerate() {
-            part.drain(..).for_each(|f| {
-                owner.insert(f, i);
-            });
-        }
-        for f in faces {
-            if let Some(&i) = owner.get(f) {
-                parts[i].push(*f);
+        let mut sides = vec![Vec::new(); parts.len()];
+        for &f in faces {
+            if let Some(side) = sides.get_mut(self.label[f] as usize) {
+                side.push(f);
             }
         }
-        parts
+        sides
     }
 
     /// The sides of the lines that promise most, by the rectangles in their direction.
@@ -396,7 +387,7 @@ impl<'a> Divider<'a> {
                 let at = (centroid(&t)[0] - low) / length.max(f64::MIN_POSITIVE);
                 let at = (at * (LINES as f64 + OFFSET)).clamp(0.0, LINES as f64) as usize;
                 strip.push(at as u8);
-                rows[at].0 = rows[at].0.and(self.of_face(f, |_| true));
+                rows[at].0 = rows[at].0.and(self.faces[f]);
                 t.into_iter().for_each(|p| rows[at].1.add(p));
             }
             let below = self.running(rows.iter());
@@ -450,6 +441,30 @@ impl<'a> Divider<'a> {
             }
         }
         sides.into()
+    }
+}
+
+/// Areas of a face, and the bend of those of its edges that count.
+fn of_face(
+    slit: &Slit,
+    bends: &EdgeVec<[f64; 2]>,
+    f: FaceId,
+    counts: impl Fn(&HalfedgeId) -> bool,
+) -> Sums {
+    let shrunk = (-slit.log_scale[f]).exp();
+    let mut bend = [0.0; 2];
+    for h in slit.connectivity.face_halfedges(f) {
+        if counts(&h) {
+            // Half of it belongs to the face on the other side.
+            let [crease, bent] = bends[slit.connectivity.edge(h)];
+            bend[0] += 0.5 * crease * shrunk.powi(3);
+            bend[1] += 0.5 * bent * shrunk.powi(4);
+        }
+    }
+    Sums {
+        area: slit.source_area[f],
+        flat: slit.flat_area[f],
+        bend,
     }
 }
 
