@@ -28,6 +28,7 @@ pub(crate) mod bounded;
 mod build;
 mod error;
 pub(crate) mod exr;
+pub mod flat;
 mod folder;
 mod gltf;
 pub(crate) mod npz;

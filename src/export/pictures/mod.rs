@@ -21,7 +21,7 @@
 mod canvas;
 mod checkerboard;
 mod coarse;
-mod colour;
+pub(crate) mod colour;
 mod convergence;
 mod floor;
 mod gallery;
