@@ -384,7 +384,9 @@ impl TexturedComponent {
             "fitted": fitted,
             "colour_step": {
                 "cut": self.steps.cut,
+                "beside_cut": self.steps.beside_cut,
                 "seams": self.steps.seams,
+                "beside_seams": self.steps.beside_seams,
                 "inside": self.steps.inside,
                 "distance": self.steps.distance,
             },
@@ -428,9 +430,11 @@ impl fmt::Display for TexturedComponent {
         let step = |step: Option<f64>| step.map_or("none".to_owned(), |s| format!("{s:.2}"));
         writeln!(
             f,
-            "  mean colour step over one texel, of 255: {} across the cut, {} across all seams, {} elsewhere",
+            "  mean colour step over one texel, of 255: {} across the cut ({} beside it), {} across all seams ({} beside them), {} elsewhere",
             step(self.steps.cut),
+            step(self.steps.beside_cut),
             step(self.steps.seams),
+            step(self.steps.beside_seams),
             step(self.steps.inside),
         )
     }

@@ -153,7 +153,11 @@ impl Exemplar {
         let [a, b, c, d] = [[x1, y1], [x0, y1], [x1, y0], [x0, y0]].map(|p| self.sum(p));
         let scale = 1.0 / (255.0 * side * side);
         std::array::from_fn(|i| {
-            let part = if i < 3 { scale / f64::from(PARTS) } else { scale };
+            let part = if i < 3 {
+                scale / f64::from(PARTS)
+            } else {
+                scale
+            };
             ((a[i] - b[i] - c[i] + d[i]) * part).max(0.0)
         })
     }
@@ -164,27 +168,37 @@ impl Exemplar {
         let [columns, rows] = size;
         let whole: [f64; 2] = std::array::from_fn(|i| (p[i] / size[i] as f64).floor());
         let rest: [f64; 2] = std::array::from_fn(|i| p[i] - whole[i] * size[i] as f64);
-        let at = |x: usize, y: usize| self.sums[y * (columns + 1) + x].map(|s| s as f64);
         let cell: [usize; 2] = std::array::from_fn(|i| (rest[i] as usize).min(size[i] - 1));
         let part: [f64; 2] = std::array::from_fn(|i| (rest[i] - cell[i] as f64).clamp(0.0, 1.0));
-        let mix = |a: [f64; 4], b: [f64; 4], t: f64| -> [f64; 4] {
-            std::array::from_fn(|i| a[i] + t * (b[i] - a[i]))
-        };
         let ([x, y], [s, t]) = (cell, part);
-        let right = mix(at(columns, y), at(columns, y + 1), t);
-        let bottom = mix(at(x, rows), at(x + 1, rows), s);
-        let corner = mix(mix(at(x, y), at(x + 1, y), s), mix(at(x, y + 1), at(x + 1, y + 1), s), t);
-        let all = at(columns, rows);
-        std::array::from_fn(|i| {
-            whole[0] * whole[1] * all[i] + whole[0] * right[i] + whole[1] * bottom[i] + corner[i]
-        })
+        let mut sum = [0.0; 4];
+        let mut add = |weight: f64, x: usize, y: usize| {
+            // Of most points only the four corners of their pixel count.
+            if weight != 0.0 {
+                let here = self.sums[y * (columns + 1) + x];
+                for i in 0..4 {
+                    sum[i] += weight * here[i] as f64;
+                }
+            }
+        };
+        add((1.0 - s) * (1.0 - t), x, y);
+        add(s * (1.0 - t), x + 1, y);
+        add((1.0 - s) * t, x, y + 1);
+        add(s * t, x + 1, y + 1);
+        add(whole[0] * (1.0 - t), columns, y);
+        add(whole[0] * t, columns, y + 1);
+        add(whole[1] * (1.0 - s), x, rows);
+        add(whole[1] * s, x + 1, rows);
+        add(whole[0] * whole[1], columns, rows);
+        sum
     }
 
     /// See [`Border`].
     #[must_use]
     pub fn border(&self) -> Border {
         let (width, height) = self.image.dimensions();
-        let columns = |a: u32, b: u32| difference((0..height).map(|y| [(a, y), (b, y)]), &self.image);
+        let columns =
+            |a: u32, b: u32| difference((0..height).map(|y| [(a, y), (b, y)]), &self.image);
         let rows = |a: u32, b: u32| difference((0..width).map(|x| [(x, a), (x, b)]), &self.image);
         Border {
             across: [columns(width - 1, 0), rows(height - 1, 0)],
@@ -256,7 +270,11 @@ mod tests {
                     (f64::from(x) + 0.5) / 7.0 + shift[0],
                     (4.5 - f64::from(y)) / 7.0 + shift[1] * exemplar.aspect(),
                 ];
-                assert_eq!(to_pixel(exemplar.mean(at, 0.0)), pixel.0, "{x} {y} {shift:?}");
+                assert_eq!(
+                    to_pixel(exemplar.mean(at, 0.0)),
+                    pixel.0,
+                    "{x} {y} {shift:?}"
+                );
             }
         }
     }
@@ -275,7 +293,10 @@ mod tests {
         for side in [1.0, 5.0] {
             let found = exemplar.mean([0.37, 0.91], side);
             for i in 0..3 {
-                assert!((found[i] - mean[i]).abs() < 1e-5, "{side}: {found:?} {mean:?}");
+                assert!(
+                    (found[i] - mean[i]).abs() < 1e-5,
+                    "{side}: {found:?} {mean:?}"
+                );
             }
         }
         // Two pixels and two halves of pixels.
@@ -298,7 +319,10 @@ mod tests {
         });
         let exemplar = Exemplar::new(image);
         assert!(exemplar.is_transparent());
-        assert_eq!(to_pixel(exemplar.mean([0.5, 0.25], 1.0)), [200, 10, 10, 128]);
+        assert_eq!(
+            to_pixel(exemplar.mean([0.5, 0.25], 1.0)),
+            [200, 10, 10, 128]
+        );
     }
 
     #[test]

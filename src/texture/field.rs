@@ -272,7 +272,7 @@ impl<'a> System<'a> {
         Complex::quarter_turns(expression.turns) * base + expression.translation(translations)
     }
 
-    /// Right side and constants for translations: `visit` gets unknowns with what is added to their right side.
+    /// Differences of constants over the edges of a face; `visit` gets unknowns with what these add to their right side.
     fn edges(
         &self,
         face: usize,
@@ -290,16 +290,18 @@ impl<'a> System<'a> {
                     visit(number, (Complex::quarter_turns(4 - turns) * d).scaled(sign));
                 }
             }
-            d.scaled(w.sqrt())
+            d
         })
     }
 
-    /// What unknowns are given whole translations: right side, and weighted differences of constants over the special edges.
+    /// What unknowns are given whole translations: right side, and differences of constants over the special edges.
     fn of_translations(&self, translations: &[Complex]) -> (Sparse, Sparse) {
         let (mut right, mut differences) = (Sparse::new(), Sparse::new());
         for (at, &face) in self.special.iter().enumerate() {
             let constants = [0, 1, 2].map(|k| self.constant(face as usize, k, translations));
-            let edges = self.edges(face as usize, constants, |number, x| right.push((number, x)));
+            let edges = self.edges(face as usize, constants, |number, x| {
+                right.push((number, x))
+            });
             let edges = edges.into_iter().enumerate();
             let entries = edges.map(|(k, d)| ((3 * at + k) as u32, d));
             differences.extend(entries.filter(|(_, d)| *d != Complex::ZERO));
@@ -307,7 +309,7 @@ impl<'a> System<'a> {
         (right, differences)
     }
 
-    /// The same for flat coordinates with the sign of −σz, σ = 1, over all faces; and the sum of all squares.
+    /// The same for flat coordinates with the sign of −σz, σ = 1, over all faces; with all differences.
     fn of_flat(&self) -> (Vec<Complex>, Vec<[Complex; 3]>) {
         let mut right = vec![Complex::ZERO; self.solver.size() / 2];
         let faces = self.surface.central_uv.iter().enumerate();
@@ -337,8 +339,22 @@ impl<'a> System<'a> {
             let terms = a.iter().map(|&(k, x)| x.conjugate() * b[k as usize]);
             terms.fold(Complex::ZERO, |sum, x| sum + x)
         };
-        let total: f64 = flat_differences.as_flattened().iter().map(|d| d.squared()).sum();
-        let minimum: f64 = flat_right.iter().zip(&flat_solved).map(|(a, b)| a.dot(*b)).sum();
+        // Some weights are negative.
+        let of_special = self.special.iter();
+        let weights: Vec<f64> = of_special.flat_map(|&f| self.weights[f as usize]).collect();
+        let weighted = |a: &Sparse, b: &[Complex]| {
+            let terms = (a.iter())
+                .map(|&(k, x)| (x.conjugate() * b[k as usize]).scaled(weights[k as usize]));
+            terms.fold(Complex::ZERO, |sum, x| sum + x)
+        };
+        let all = self.weights.as_flattened().iter();
+        let all = all.zip(flat_differences.as_flattened());
+        let total: f64 = all.map(|(w, d)| w * d.squared()).sum();
+        let minimum: f64 = flat_right
+            .iter()
+            .zip(&flat_solved)
+            .map(|(a, b)| a.dot(*b))
+            .sum();
         let on_special: Vec<Complex> = self
             .special
             .iter()
@@ -349,7 +365,7 @@ impl<'a> System<'a> {
             mixed: columns
                 .iter()
                 .map(|(right, differences)| {
-                    inner(differences, &on_special) - inner(right, &flat_solved)
+                    weighted(differences, &on_special) - inner(right, &flat_solved)
                 })
                 .collect(),
             flat: total - minimum,
@@ -365,7 +381,7 @@ impl<'a> System<'a> {
                 own[at as usize] += d;
             }
             for (j, (right, differences)) in columns.iter().enumerate() {
-                energy.form[j][k] = inner(differences, &own) - inner(right, &solved);
+                energy.form[j][k] = weighted(differences, &own) - inner(right, &solved);
             }
         }
         energy
@@ -422,7 +438,10 @@ impl<'a> System<'a> {
                 all += weights[k] * flat.squared();
             }
         }
-        (largest, (squares / all.max(f64::MIN_POSITIVE)).max(0.0).sqrt())
+        (
+            largest,
+            (squares / all.max(f64::MIN_POSITIVE)).max(0.0).sqrt(),
+        )
     }
 }
 
@@ -432,7 +451,9 @@ const HELD: u32 = NONE - 1;
 /// Cotangent weights of the edges opposite the corners.
 fn weights(uv: [[f64; 2]; 3]) -> [f64; 3] {
     let side = |i: usize, j: usize| Complex::point(uv[j]) - Complex::point(uv[i]);
-    let longest = (0..3).map(|k| side(k, (k + 1) % 3).squared()).fold(0.0, f64::max);
+    let longest = (0..3)
+        .map(|k| side(k, (k + 1) % 3).squared())
+        .fold(0.0, f64::max);
     let thickness = doubled_area(uv).abs().max(LEAST_THICKNESS * longest);
     [0, 1, 2].map(|k| {
         let corner = side(k, (k + 1) % 3).dot(side(k, (k + 2) % 3));

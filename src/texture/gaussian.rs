@@ -198,7 +198,10 @@ mod tests {
         assert_eq!(z.length(), 5.0);
         assert!((z * z.inverse() - Complex::ONE).length() < 1e-15);
         assert_eq!(z.dot(i), -4.0);
-        assert_eq!(Complex::new(1.4, 1.4).rounded([1.0, 0.5]), Complex::new(1.0, 1.5));
+        assert_eq!(
+            Complex::new(1.4, 1.4).rounded([1.0, 0.5]),
+            Complex::new(1.0, 1.5)
+        );
     }
 
     #[test]

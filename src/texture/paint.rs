@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 /// Texels outside a patch over which its pattern goes on.
 pub const MARGIN: f64 = 4.0;
-/// Samples along a side of a texel that is larger than a pixel.
+/// Most samples along a side of a texel that is larger than a pixel; below, one for each pixel.
 const SAMPLES: usize = 4;
 
 /// A square of texels, row 0 at the top.
@@ -77,15 +77,21 @@ pub fn paint(surface: &FlatSurface, field: &Field, exemplar: &Exemplar, size: us
         size,
     };
     let centre = |at: usize| [(at % size) as f64 + 0.5, (at / size) as f64 + 0.5];
-    let texels = nearest.par_iter().enumerate().map(|(at, &source)| {
-        let Some(&face) = face_of.get(source).filter(|&&face| face != NONE) else {
-            return [0; 4];
-        };
-        let (place, from) = (centre(at), centre(source));
-        let distance = (place[0] - from[0]).hypot(place[1] - from[1]);
-        let place = if distance <= MARGIN { place } else { from };
-        brush.texel(face as usize, from, place)
+    let is_near = |at: usize| {
+        let (place, from) = (centre(at), centre(nearest[at]));
+        (place[0] - from[0]).hypot(place[1] - from[1]) <= MARGIN
+    };
+    let near = (0..nearest.len()).into_par_iter().map(|at| {
+        let source = nearest[at];
+        match face_of[source] {
+            NONE => [0; 4],
+            _ if !is_near(at) => [0; 4],
+            face => brush.texel(face as usize, centre(source), centre(at)),
+        }
     });
+    let near: Vec<[u8; 4]> = near.collect();
+    let texels = (0..nearest.len()).into_par_iter();
+    let texels = texels.map(|at| near[if is_near(at) { at } else { nearest[at] }]);
     Painted {
         size,
         texels: texels.collect(),
@@ -135,19 +141,19 @@ impl Brush<'_> {
         let steps = self.steps(face, corners, values);
         let weights = barycentric(corners, from);
         let base = (0..3).fold(Complex::ZERO, |sum, k| sum + values[k].scaled(weights[k]));
-        let middle = base
-            + steps[0].scaled(place[0] - from[0])
-            + steps[1].scaled(place[1] - from[1]);
+        let middle =
+            base + steps[0].scaled(place[0] - from[0]) + steps[1].scaled(place[1] - from[1]);
         let side = steps[0].length().max(steps[1].length());
         let pixels = side * self.exemplar.size()[0] as f64;
         if pixels <= 1.0 {
             return to_pixel(self.exemplar.mean(middle.coordinates(), side));
         }
-        let part = 1.0 / SAMPLES as f64;
+        let count = (pixels.ceil() as usize).min(SAMPLES);
+        let part = 1.0 / count as f64;
         let offset = |k: usize| (k as f64 + 0.5) * part - 0.5;
         let mut sum = [0.0; 4];
-        for i in 0..SAMPLES {
-            for j in 0..SAMPLES {
+        for i in 0..count {
+            for j in 0..count {
                 let at = middle + steps[0].scaled(offset(i)) + steps[1].scaled(offset(j));
                 let mean = self.exemplar.mean(at.coordinates(), side * part);
                 for (sum, c) in sum.iter_mut().zip(mean) {
@@ -185,9 +191,8 @@ impl Brush<'_> {
 
 /// Weights of a triangle's corners at a point, held to the triangle; the same for all corners where it has no area.
 fn barycentric(t: [[f64; 2]; 3], p: [f64; 2]) -> [f64; 3] {
-    let area = |a: [f64; 2], b: [f64; 2]| {
-        (a[0] - p[0]) * (b[1] - p[1]) - (a[1] - p[1]) * (b[0] - p[0])
-    };
+    let area =
+        |a: [f64; 2], b: [f64; 2]| (a[0] - p[0]) * (b[1] - p[1]) - (a[1] - p[1]) * (b[0] - p[0]);
     let parts = [area(t[1], t[2]), area(t[2], t[0]), area(t[0], t[1])];
     let sum: f64 = parts.iter().sum();
     let held = parts.map(|x| (x / sum).max(0.0));

@@ -121,8 +121,11 @@ impl<'a> Rounding<'a> {
             row[j].re += ridge;
         }
         for step in 0..count {
-            let cheapest = (0..left.len())
-                .min_by(|&a, &b| rest[left[a]][left[a]].re.total_cmp(&rest[left[b]][left[b]].re));
+            let cheapest = (0..left.len()).min_by(|&a, &b| {
+                rest[left[a]][left[a]]
+                    .re
+                    .total_cmp(&rest[left[b]][left[b]].re)
+            });
             let pivot = left.remove(cheapest.unwrap_or(0));
             let root = rest[pivot][pivot].re.max(ridge).sqrt();
             factor[pivot][step] = Complex::new(root, 0.0);
@@ -188,9 +191,8 @@ impl<'a> Rounding<'a> {
         let least = 1e-12 * sigma.squared() * flat;
         loop {
             // What a step of one gains, and the best of them.
-            let cost = |j: usize, step: Complex| {
-                2.0 * step.dot(slope[j]) + step.squared() * form[j][j].re
-            };
+            let cost =
+                |j: usize, step: Complex| 2.0 * step.dot(slope[j]) + step.squared() * form[j][j].re;
             let mut best = (-least, Vec::new());
             for j in 0..count {
                 for step in moves {
@@ -237,11 +239,16 @@ mod tests {
         let count = a[0].len();
         let column = |j: usize| a.iter().map(move |row| row[j]);
         let inner = |x: &mut dyn Iterator<Item = Complex>, y: &mut dyn Iterator<Item = Complex>| {
-            x.zip(y).fold(Complex::ZERO, |sum, (x, y)| sum + x.conjugate() * y)
+            x.zip(y)
+                .fold(Complex::ZERO, |sum, (x, y)| sum + x.conjugate() * y)
         };
         Energy {
             form: (0..count)
-                .map(|j| (0..count).map(|k| inner(&mut column(j), &mut column(k))).collect())
+                .map(|j| {
+                    (0..count)
+                        .map(|k| inner(&mut column(j), &mut column(k)))
+                        .collect()
+                })
                 .collect(),
             mixed: (0..count)
                 .map(|j| -inner(&mut column(j), &mut b.iter().copied()))
@@ -261,14 +268,19 @@ mod tests {
         let whole = [c(3.0, -1.0), c(0.0, 2.0), c(-4.0, 1.0)];
         // Turned by one of the directions, and a little too large.
         let turn = Complex::new((0.1 * 1.05f64).exp(), 0.0)
-            * c((std::f64::consts::FRAC_PI_8).cos(), std::f64::consts::FRAC_PI_8.sin());
+            * c(
+                (std::f64::consts::FRAC_PI_8).cos(),
+                std::f64::consts::FRAC_PI_8.sin(),
+            );
         let b: Vec<Complex> = a.iter().map(|row| product(row, &whole) * turn).collect();
         let rounded = round(&form(&a, &b), 1.0, [1.0; 2]).expect("near");
-        assert!((rounded.scale * turn - Complex::ONE).length() < 1e-12 || {
-            // Up to a quarter turn of everything.
-            let ratio = rounded.scale * turn;
-            (ratio * ratio * ratio * ratio - Complex::ONE).length() < 1e-9
-        });
+        assert!(
+            (rounded.scale * turn - Complex::ONE).length() < 1e-12 || {
+                // Up to a quarter turn of everything.
+                let ratio = rounded.scale * turn;
+                (ratio * ratio * ratio * ratio - Complex::ONE).length() < 1e-9
+            }
+        );
         let found = form(&a, &b).best_scale(&rounded.whole).expect("a scale");
         assert!(found.1 < 1e-9, "{found:?}");
     }
@@ -277,7 +289,10 @@ mod tests {
     fn nothing_near_is_refused() {
         let one = vec![vec![Complex::ONE]];
         // A translation of a hundredth of a tile.
-        assert_eq!(round(&form(&one, &[Complex::new(0.01, 0.0)]), 1.0, [1.0; 2]), None);
+        assert_eq!(
+            round(&form(&one, &[Complex::new(0.01, 0.0)]), 1.0, [1.0; 2]),
+            None
+        );
         // A tile of half the height.
         let half = form(&one, &[Complex::new(0.0, 2.5)]);
         let rounded = round(&half, 1.0, [1.0, 0.5]).expect("near");

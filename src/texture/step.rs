@@ -3,7 +3,9 @@
 //! *Enters:* a painted surface. *Leaves:* [`Steps`]: mean differences of channels (of 255) between two points at the same flat distance,
 //! one texel of mean size, on the two sides of edges that are cut, of edges where patches end, and of all others.
 //!
-//! Points are looked up in the texture as a viewer would, half the distance to each side of an edge along its length.
+//! Points are looked up in the texture as a viewer would, half the distance to each side of an edge along its length. A pattern is not
+//! equally varied everywhere, least of all at cones, where its centres lie: so seams are also compared with pairs of points of the
+//! same direction right beside them, half the distance and one and a half from the edge.
 
 use super::field::flat_area;
 use super::paint::{Painted, in_texels};
@@ -16,21 +18,29 @@ use crate::read::flat::FlatSurface;
 pub struct Steps {
     /// Across the cut.
     pub cut: Option<f64>,
+    /// Right beside the cut, on either side.
+    pub beside_cut: Option<f64>,
     /// Wherever texture coordinates jump: the cut, and where patches end without it.
     pub seams: Option<f64>,
+    /// Right beside these, on either side.
+    pub beside_seams: Option<f64>,
     /// Across all other edges.
     pub inside: Option<f64>,
     /// Distance between the two points, flat units.
     pub distance: f64,
 }
 
-#[derive(Default)]
 struct Mean {
     sum: f64,
     length: f64,
 }
 
 impl Mean {
+    const ZERO: Mean = Mean {
+        sum: 0.0,
+        length: 0.0,
+    };
+
     fn add(&mut self, value: f64, length: f64) {
         self.sum += value * length;
         self.length += length;
@@ -45,40 +55,60 @@ impl Mean {
 #[must_use]
 pub fn steps(surface: &FlatSurface, connectivity: &Connectivity, painted: &Painted) -> Steps {
     let distance = (flat_area(surface) / painted.covered.max(1) as f64).sqrt();
-    let (mut cut, mut seams, mut inside) = (Mean::default(), Mean::default(), Mean::default());
+    let [
+        mut cut,
+        mut beside_cut,
+        mut seams,
+        mut beside_seams,
+        mut inside,
+    ] = [const { Mean::ZERO }; 5];
     for e in connectivity.edges() {
         let h = connectivity.edge_halfedge(e);
         let Some(twin) = connectivity.twin(h) else {
             continue;
         };
-        let sides = [(h, false), (twin, true)].map(|(h, reversed)| Side::new(surface, connectivity, h, reversed, painted.size));
+        let sides = [(h, false), (twin, true)]
+            .map(|(h, reversed)| Side::new(surface, connectivity, h, reversed, painted.size));
         let [Some(left), Some(right)] = sides else {
             continue;
         };
         let count = (left.length / distance).ceil().clamp(1.0, 1e4) as usize;
-        let mut sum = 0.0;
+        let (mut sum, mut sum_beside) = (0.0, 0.0);
         for k in 0..count {
             let t = (k as f64 + 0.5) / count as f64;
-            let [a, b] = [&left, &right].map(|side| painted.at(side.place(t, 0.5 * distance)));
-            sum += (0..4).map(|i| (a[i] - b[i]).abs()).sum::<f64>() / 4.0;
+            let near = [&left, &right].map(|side| painted.at(side.place(t, 0.5 * distance)));
+            let far = [&left, &right].map(|side| painted.at(side.place(t, 1.5 * distance)));
+            sum += difference(near[0], near[1]);
+            sum_beside += 0.5 * (difference(near[0], far[0]) + difference(near[1], far[1]));
         }
-        let (mean, length) = (sum / count as f64, left.length);
+        let [mean, beside] = [sum, sum_beside].map(|x| x / count as f64);
+        let length = left.length;
         let (f, corner) = (connectivity.face(h).index(), connectivity.corner(h));
         if surface.segment[f][(corner + 2) % 3] != NONE {
             cut.add(mean, length);
+            beside_cut.add(beside, length);
             seams.add(mean, length);
+            beside_seams.add(beside, length);
         } else if left.is_apart(&right) {
             seams.add(mean, length);
+            beside_seams.add(beside, length);
         } else {
             inside.add(mean, length);
         }
     }
     Steps {
         cut: cut.value(),
+        beside_cut: beside_cut.value(),
         seams: seams.value(),
+        beside_seams: beside_seams.value(),
         inside: inside.value(),
         distance,
     }
+}
+
+/// Mean difference of the channels.
+fn difference(a: [f64; 4], b: [f64; 4]) -> f64 {
+    (0..4).map(|i| (a[i] - b[i]).abs()).sum::<f64>() / 4.0
 }
 
 /// An edge as one of its faces has it in the texture.
@@ -109,13 +139,19 @@ impl Side {
         let (texel_length, length) = (along[0].hypot(along[1]), flat[0].hypot(flat[1]));
         // Rows run down, so that the left of the halfedge is on its right here.
         let inwards = [along[1], -along[0]].map(|x| x / length);
-        let ends = if reversed { [texels[to], texels[from]] } else { [texels[from], texels[to]] };
-        (texel_length > 0.0 && length > 0.0 && inwards.iter().all(|x| x.is_finite())).then_some(Self {
-            ends,
-            inwards,
-            patch: surface.patch[face],
-            length,
-        })
+        let ends = if reversed {
+            [texels[to], texels[from]]
+        } else {
+            [texels[from], texels[to]]
+        };
+        (texel_length > 0.0 && length > 0.0 && inwards.iter().all(|x| x.is_finite())).then_some(
+            Self {
+                ends,
+                inwards,
+                patch: surface.patch[face],
+                length,
+            },
+        )
     }
 
     fn place(&self, t: f64, inwards: f64) -> [f64; 2] {

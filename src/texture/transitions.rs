@@ -103,7 +103,12 @@ pub(super) fn transitions(
 ) -> Result<Transitions, TextureError> {
     let segments = surface.segments.iter().enumerate();
     let along: FxHashSet<(u32, u32, u32)> = segments
-        .flat_map(|(s, segment)| segment.vertices.windows(2).map(move |w| (s as u32, w[0], w[1])))
+        .flat_map(|(s, segment)| {
+            segment
+                .vertices
+                .windows(2)
+                .map(move |w| (s as u32, w[0], w[1]))
+        })
         .collect();
     let segment_of = |h: HalfedgeId| {
         let (face, corner) = (connectivity.face(h), connectivity.corner(h));

@@ -93,12 +93,7 @@ where
     use image::codecs::png::{CompressionType, FilterType, PngEncoder};
     let mut bytes = Vec::new();
     PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive)
-        .write_image(
-            image.as_raw(),
-            image.width(),
-            image.height(),
-            P::COLOR_TYPE,
-        )?;
+        .write_image(image.as_raw(), image.width(), image.height(), P::COLOR_TYPE)?;
     Ok(bytes)
 }
 
