@@ -27,6 +27,3 @@ pub use field::{Field, Fitted, Tile, as_it_is, fit, flat_area};
 pub use gaussian::Complex;
 pub use paint::{MARGIN, Painted, paint};
 pub use step::{Steps, steps};
-
-#[cfg(test)]
-mod tests;
