@@ -386,13 +386,13 @@ fn texture_without_a_folder_or_a_pattern() {
     insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @"failed: atlas (input): the pattern a.png cannot be read: No such file or directory (os error 2)");
     insta::assert_snapshot!(texture(&["atlas", "-p", "empty"], 1), @"failed: atlas (input): the pattern empty cannot be read: it is no file");
     std::fs::write(folder.path().join("a.png"), "no image").expect("written");
-    insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @"");
+    insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @"failed: atlas (input): the pattern a.png is no image that can be read (Format error decoding Png: Invalid PNG signature.); give a PNG or JPEG file");
     std::fs::write(
         folder.path().join("a.png"),
         include_bytes!("../fixtures/patterns/waves.png"),
     )
     .expect("written");
-    insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @"");
+    insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @r#"failed: atlas (input): atlas/atlas.json says format "", version 0; this program reads "affine-atlas", version 1"#);
     let left = std::fs::read_dir(folder.path()).expect("a folder").count();
     assert_eq!(left, 3, "something was written");
 }

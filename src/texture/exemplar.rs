@@ -12,7 +12,7 @@ use image::{ImageReader, RgbaImage};
 use std::path::Path;
 
 /// Most pixels a side.
-const SIDE_LIMIT: u32 = 8192;
+const SIDE_LIMIT: u32 = 4096;
 /// Linear light is summed in whole parts of this.
 const PARTS: f32 = 65535.0;
 /// Mean difference of channels (of 255) up to which an image counts as the same: what rounding to bytes does.
@@ -98,9 +98,13 @@ impl Exemplar {
         Ok(Self::new(image.to_rgba8()))
     }
 
-    /// Takes an image, at least one pixel.
+    /// Takes an image; one without pixels becomes one transparent pixel.
     #[must_use]
     pub fn new(image: RgbaImage) -> Self {
+        let image = match image.is_empty() {
+            true => RgbaImage::new(1, 1),
+            false => image,
+        };
         let (width, height) = (image.width() as usize, image.height() as usize);
         let mut sums = vec![[0; 4]; (width + 1) * (height + 1)];
         for (y, row) in image.rows().enumerate() {

@@ -64,9 +64,10 @@ pub(super) fn in_texels(surface: &FlatSurface, face: usize, size: usize) -> [[f6
         .map(|[u, v]| [size * u, size * (1.0 - v)])
 }
 
-/// Paints a square of `size` × `size` texels.
+/// Paints a square of `size` × `size` texels, at least one.
 #[must_use]
 pub fn paint(surface: &FlatSurface, field: &Field, exemplar: &Exemplar, size: usize) -> Painted {
+    let size = size.max(1);
     let face_of = owners(surface, size);
     let sources: Vec<bool> = face_of.iter().map(|&f| f != NONE).collect();
     let nearest = nearest_sources(&sources, size);

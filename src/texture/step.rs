@@ -106,6 +106,22 @@ pub fn steps(surface: &FlatSurface, connectivity: &Connectivity, painted: &Paint
     }
 }
 
+/// Where the inward normal of a side of a face, one flat unit long, comes to lie in a texture that is no similar copy of the chart. The side and
+/// the third corner are given as corners.
+fn straight_in(
+    [from, to, apex]: [usize; 3],
+    texels: [[f64; 2]; 3],
+    chart: [[f64; 2]; 3],
+) -> [f64; 2] {
+    let span = |p: [[f64; 2]; 3], k: usize| [p[k][0] - p[from][0], p[k][1] - p[from][1]];
+    let (side, rise) = (span(chart, to), span(chart, apex));
+    let squared = side[0] * side[0] + side[1] * side[1];
+    let height = (side[0] * rise[1] - side[1] * rise[0]) / squared.sqrt();
+    let foot = (side[0] * rise[0] + side[1] * rise[1]) / squared;
+    let (side, rise) = (span(texels, to), span(texels, apex));
+    std::array::from_fn(|i| (rise[i] - foot * side[i]) / height)
+}
+
 /// Mean difference of the channels.
 fn difference(a: [f64; 4], b: [f64; 4]) -> f64 {
     (0..4).map(|i| (a[i] - b[i]).abs()).sum::<f64>() / 4.0
@@ -137,8 +153,11 @@ impl Side {
         let span = |p: &[[f64; 2]; 3]| [p[to][0] - p[from][0], p[to][1] - p[from][1]];
         let (along, flat) = (span(&texels), span(&chart));
         let (texel_length, length) = (along[0].hypot(along[1]), flat[0].hypot(flat[1]));
-        // Rows run down, so that the left of the halfedge is on its right here.
-        let inwards = [along[1], -along[0]].map(|x| x / length);
+        let inwards = match surface.patches[surface.patch[face] as usize].to_chart {
+            // Rows run down, so that the left of the halfedge is on its right here.
+            Some(_) => [along[1], -along[0]].map(|x| x / length),
+            None => straight_in([from, to, (corner + 2) % 3], texels, chart),
+        };
         let ends = if reversed {
             [texels[to], texels[from]]
         } else {

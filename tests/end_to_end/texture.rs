@@ -120,6 +120,8 @@ fn coordinates_differ_by_quarter_turns_and_whole_translations_across_the_cut() {
 /// With tiles as large as its sides, a cube has one tile on each: cones are centres of rotation, corners or middles of tiles.
 #[test]
 fn a_cube_shows_one_tile_a_side() {
+    // The pattern is the formula that colours are compared with.
+    assert_eq!(std::fs::read(WAVES).expect("committed"), pattern::png());
     let built = fixture("genus-0-cube.obj", &QUARTERS);
     let asset = laid(&built.atlas(), TileSize::Width(1.0), 512);
     let [component] = &asset.components[..] else {
