@@ -114,8 +114,9 @@ pub fn fit(
     }
     let corners = system.solve(&translations, rounded.scale);
     let largest_misfit = misfit(connectivity, &walked, &corners, &translations);
-    // The comparison is false for NaN, too.
-    if !(largest_misfit <= WHOLE_TOLERANCE) {
+    // Also false for NaN.
+    let closes = largest_misfit <= WHOLE_TOLERANCE;
+    if !closes {
         return Err(TextureError::Misfit { largest_misfit });
     }
     let (largest_correction, stretch) = system.correction(&corners, rounded.scale);
