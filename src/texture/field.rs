@@ -223,9 +223,8 @@ impl<'a> System<'a> {
                 special.push(f as u32);
             }
             let turns = walked.corner[f].map(|e| walked.expressions[e as usize].turns);
-            for k in 0..3 {
+            for (k, &w) in weights[f].iter().enumerate() {
                 let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-                let w = weights[f][k];
                 for number in [numbers[i], numbers[j]].into_iter().filter(|&n| n != NONE) {
                     for part in 0..2 {
                         diagonal[2 * number as usize + part] += w;

@@ -120,7 +120,8 @@ impl<'a> Rounding<'a> {
         for (j, row) in rest.iter_mut().enumerate() {
             row[j].re += ridge;
         }
-        for step in 0..count {
+        while !left.is_empty() {
+            let step = order.len();
             let cheapest = (0..left.len()).min_by(|&a, &b| {
                 rest[left[a]][left[a]]
                     .re
@@ -203,11 +204,11 @@ impl<'a> Rounding<'a> {
                 }
             }
             if best.1.is_empty() && count <= PAIRED {
-                for j in 0..count {
-                    for k in j + 1..count {
+                for (j, row) in form.iter().enumerate() {
+                    for (k, &entry) in row.iter().enumerate().skip(j + 1) {
                         for step in moves {
                             for other in moves {
-                                let both = 2.0 * step.dot(form[j][k] * other);
+                                let both = 2.0 * step.dot(entry * other);
                                 let gained = cost(j, step) + cost(k, other) + both;
                                 if gained < best.0 {
                                     best = (gained, vec![(j, step), (k, other)]);

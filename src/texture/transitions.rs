@@ -21,13 +21,13 @@ pub(super) struct Expression {
 
 impl Expression {
     /// Across segment s from its left to its right: i^r (…) + T_s.
-    fn to_right(&mut self, segment: u32, turns: u8) {
+    fn cross_to_right(&mut self, segment: u32, turns: u8) {
         self.turn(turns);
         self.push(segment, 0);
     }
 
     /// From the right to the left: i^(−r) ((…) − T_s).
-    fn to_left(&mut self, segment: u32, turns: u8) {
+    fn cross_to_left(&mut self, segment: u32, turns: u8) {
         self.push(segment, 2);
         self.turn(4 - turns);
     }
@@ -157,8 +157,8 @@ pub(super) fn transitions(
             }
             let turns = walked.turns[segment as usize];
             match is_left(next, segment)? {
-                true => expression.to_right(segment, turns),
-                false => expression.to_left(segment, turns),
+                true => expression.cross_to_right(segment, turns),
+                false => expression.cross_to_left(segment, turns),
             }
             number = walked.expressions.len() as u32;
             walked.expressions.push(expression.clone());
