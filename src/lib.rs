@@ -15,7 +15,7 @@
 //! Every arrow is a function from finished values to a finished value; [`job`] is the page on which they
 //! stand in order. Dependencies point one way: `geometry` ← `flow` ← `atlas` ← `product` ← `report`,
 //! `export`; `read` and `repair` know `geometry` only; [`rebuild`] makes a mesh again from images and seams alone, in memory for
-//! `report` and from a folder for the command; [`fit`] makes spline surfaces of the images of rectangles; [`verify`] reads what was written and shares no
+//! `report` and from a folder for the command; [`fit`] makes spline surfaces of the images of rectangles; [`texture`] lays an image that repeats over the surface; [`verify`] reads what was written and shares no
 //! code with the stages that made it (but the readers of file formats in `read`).
 //!
 //! ```
@@ -77,6 +77,7 @@ pub mod read;
 pub mod rebuild;
 pub mod repair;
 pub mod report;
+pub mod texture;
 pub mod verify;
 
 pub use job::build;

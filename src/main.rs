@@ -19,7 +19,7 @@ use affine_atlas::read::{self, ReadParams};
 use affine_atlas::verify::{self, SourceSurface, VerifyOptions};
 use cli::work::{
     FitRequest, FitResult, Inspection, RebuildRequest, RebuildResult, SurveyRequest, Surveyed,
-    VerifyRequest, VerifyResult, Work,
+    TextureRequest, TextureResult, VerifyRequest, VerifyResult, Work,
 };
 use std::path::Path;
 use std::process::ExitCode;
@@ -34,6 +34,7 @@ const WORK: Work = Work {
     verify,
     rebuild,
     fit,
+    texture,
     remove_staging: remove_all_staging,
 };
 
@@ -146,5 +147,16 @@ fn fit(request: &FitRequest) -> Result<FitResult, Failure> {
     Ok(FitResult {
         text: fitted.to_string(),
         json: fitted.json(),
+    })
+}
+
+fn texture(request: &TextureRequest) -> Result<TextureResult, Failure> {
+    let textured = job::texture::texture(&request.folder, &request.params);
+    let textured = textured.map_err(|error| Failure::from(&error))?;
+    let written = textured.write(&request.root, &request.name);
+    written.map_err(|error| Failure::from(&error))?;
+    Ok(TextureResult {
+        text: textured.to_string(),
+        json: textured.json(),
     })
 }

@@ -354,6 +354,50 @@ fn fit_without_a_folder_or_a_name() {
 }
 
 #[test]
+fn texture_without_a_folder_or_a_pattern() {
+    let folder = folder();
+    let texture = |arguments: &[&str], code: i32| {
+        let all = [&["texture"], arguments].concat();
+        refusal(folder.path(), &all, code)
+    };
+    insta::assert_snapshot!(texture(&["nowhere", "-p", "a.png"], 2), @r"
+    error: there is no folder nowhere
+    help: name a folder that `affine-atlas build` wrote
+    ");
+    insta::assert_snapshot!(texture(&[".", "-p", "a.png", "-o", ".."], 2), @r"
+    error: .. does not end in the name of a folder to write
+    help: name it with `--out FOLDER`
+    ");
+    insta::assert_snapshot!(texture(&[".", "-p", "a.png", "--tile-size", "0"], 2), @r"
+    error: invalid value '0' for '--tile-size <LENGTH>': it must be a positive number
+
+    For more information, try '--help'.
+    ");
+    insta::assert_snapshot!(texture(&[".", "-p", "a.png", "--size", "0"], 2), @r"
+    error: invalid value '0' for '--size <N>': 0 is not in 16..=8192
+
+    For more information, try '--help'.
+    ");
+    std::fs::create_dir(folder.path().join("empty")).expect("created");
+    insta::assert_snapshot!(texture(&["empty", "-p", "a.png"], 1), @"failed: empty (input): empty holds no atlas.json and no component-000; give the folder that `affine-atlas build` wrote for a mesh");
+    // The pattern is read before the atlas.
+    std::fs::create_dir(folder.path().join("atlas")).expect("created");
+    std::fs::write(folder.path().join("atlas/atlas.json"), "{}").expect("written");
+    insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @"failed: atlas (input): the pattern a.png cannot be read: No such file or directory (os error 2)");
+    insta::assert_snapshot!(texture(&["atlas", "-p", "empty"], 1), @"failed: atlas (input): the pattern empty cannot be read: it is no file");
+    std::fs::write(folder.path().join("a.png"), "no image").expect("written");
+    insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @"failed: atlas (input): the pattern a.png is no image that can be read (Format error decoding Png: Invalid PNG signature.); give a PNG or JPEG file");
+    std::fs::write(
+        folder.path().join("a.png"),
+        include_bytes!("../fixtures/patterns/waves.png"),
+    )
+    .expect("written");
+    insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @r#"failed: atlas (input): atlas/atlas.json says format "", version 0; this program reads "affine-atlas", version 1"#);
+    let left = std::fs::read_dir(folder.path()).expect("a folder").count();
+    assert_eq!(left, 3, "something was written");
+}
+
+#[test]
 fn wrong_arguments_exit_with_2_and_help_with_0() {
     let folder = folder();
     for arguments in [
@@ -365,6 +409,18 @@ fn wrong_arguments_exit_with_2_and_help_with_0() {
         &["rebuild", "."],
         &["fit"],
         &["fit", ".", "--spacing", "nan"],
+        &["texture", "."],
+        &["texture", ".", "-p", "a.png", "--repeat", "0"],
+        &[
+            "texture",
+            ".",
+            "-p",
+            "a.png",
+            "--repeat",
+            "2",
+            "--tile-size",
+            "2",
+        ],
         &["build", "-q", "-v"],
     ] {
         assert_eq!(
@@ -402,6 +458,7 @@ fn help() {
       verify   Read atlases back and check every property they must have
       rebuild  Make a mesh again from the geometry images of an atlas
       fit      Fit spline surfaces to the images of rectangles
+      texture  Lay a repeating image over the whole surface as one texture
       init     Write a configuration file that explains every key
       help     Print this message or the help of the given subcommand(s)
 

@@ -248,7 +248,7 @@ impl GeometryImage {
 ///
 /// Two passes (Meijster, Roerdink, Hesselink 2000): the nearest source in each column, then along each
 /// row the lower envelope of the parabolas `(x − column)² + distance²`. Whole numbers throughout.
-fn nearest_sources(sources: &[bool], width: usize) -> Vec<usize> {
+pub(crate) fn nearest_sources(sources: &[bool], width: usize) -> Vec<usize> {
     let mut nearest: Vec<usize> = (0..sources.len()).collect();
     if width == 0 || !sources.contains(&true) {
         return nearest;

@@ -1,6 +1,7 @@
 //! Arguments and their help texts.
 
 use affine_atlas::fit::{DEFAULT_SPACING, LEAST_SPACING};
+use affine_atlas::job::texture::{DEFAULT_REPEAT, DEFAULT_SIZE, SIZE_RANGE};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -80,6 +81,9 @@ pub enum Command {
     /// Fit spline surfaces to the images of rectangles
     #[command(after_help = FIT_EXAMPLES, after_long_help = FIT_EXAMPLES)]
     Fit(Fit),
+    /// Lay a repeating image over the whole surface as one texture
+    #[command(after_help = TEXTURE_EXAMPLES, after_long_help = TEXTURE_EXAMPLES)]
+    Texture(Texture),
     /// Write a configuration file that explains every key
     #[command(after_help = INIT_EXAMPLES, after_long_help = INIT_EXAMPLES)]
     Init(Init),
@@ -146,6 +150,21 @@ Fits one bicubic B-spline surface to the image of every rectangle. Neighbours sh
 points of their sides, so that there are no gaps. The new folder holds
   NAME.xml   a MultiPatch with interfaces and boundary, as G+Smo reads it (one a component)
   fit.json   errors of every patch and of every shared side
+It appears when it is complete.";
+
+const TEXTURE_EXAMPLES: &str = "\
+Examples:
+  affine-atlas build bunny.obj --set cones.quantum=1/2
+  affine-atlas texture affine-atlas-out/bunny --pattern tiles.png
+  affine-atlas texture affine-atlas-out/bunny --pattern tiles.png --repeat 30 --size 4096 -o bunny-tiled
+
+The image is laid in flat coordinates. Where all transitions are quarter turns (cones.quantum = 1/2 on genus 0), these are
+deformed a little so that whole tiles fit; an image that looks the same after a quarter turn then has no
+seams. Elsewhere it jumps at the cut. The new folder holds
+  NAME.png           the texture for the TEXCOORD_0 of surface.glb (one a component)
+  NAME.glb           the surface with that texture
+  NAME.preview.png   a picture of it
+  texture.json       size and number of tiles, how far they were moved, colour steps across seams and elsewhere
 It appears when it is complete.";
 
 const INIT_EXAMPLES: &str = "\
@@ -248,6 +267,40 @@ pub struct Fit {
     /// Write JSON instead of text
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct Texture {
+    /// Folder that `build` wrote for a mesh
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// Image that repeats in both directions (PNG or JPEG)
+    #[arg(short, long, value_name = "IMAGE")]
+    pub pattern: PathBuf,
+    /// Folder to write, replacing an older one [default: DIR.texture]
+    #[arg(short, long, value_name = "FOLDER")]
+    pub out: Option<PathBuf>,
+    /// Tiles along a side of a square as large as the surface in flat coordinates
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_REPEAT, value_parser = positive)]
+    pub repeat: f64,
+    /// Width of a tile in flat coordinates, in place of a number of tiles
+    #[arg(long, value_name = "LENGTH", value_parser = positive, conflicts_with = "repeat")]
+    pub tile_size: Option<f64>,
+    /// Texels along a side of the texture
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_SIZE, value_parser = clap::value_parser!(u32).range(SIZE_RANGE))]
+    pub size: u32,
+    /// Write JSON instead of text
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A positive number.
+fn positive(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok();
+    let good = |x: &f64| x.is_finite() && *x > 0.0;
+    number
+        .filter(good)
+        .ok_or_else(|| "it must be a positive number".to_owned())
 }
 
 /// A number from the least spacing on.

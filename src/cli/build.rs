@@ -154,6 +154,12 @@ mod tests {
                 message: String::new(),
             })
         },
+        texture: |_| {
+            Err(Failure {
+                kind: FailureKind::Input,
+                message: String::new(),
+            })
+        },
         remove_staging: || {},
     };
 

@@ -19,7 +19,7 @@ pub fn run(fit: &Fit, global: &Global, work: &Work) -> Result<u8, Problem> {
     }
     let out = match &fit.out {
         Some(out) => out.clone(),
-        None => beside(&fit.folder),
+        None => beside(&fit.folder, ".fit"),
     };
     let no_name = || Problem::NoName { path: out.clone() };
     let name = out.file_name().ok_or_else(no_name)?;
@@ -63,8 +63,8 @@ pub fn run(fit: &Fit, global: &Global, work: &Work) -> Result<u8, Problem> {
     }
 }
 
-/// The folder's name with `.fit` behind it.
-fn beside(folder: &Path) -> PathBuf {
+/// The folder's name with an extension behind it.
+pub(super) fn beside(folder: &Path, extension: &str) -> PathBuf {
     // `.` and `..` are names only once resolved.
     let named = match folder.file_name() {
         Some(_) => folder.to_owned(),
@@ -73,7 +73,7 @@ fn beside(folder: &Path) -> PathBuf {
     match named.file_name() {
         Some(name) => {
             let mut name = name.to_owned();
-            name.push(".fit");
+            name.push(extension);
             named.with_file_name(name)
         }
         None => named,

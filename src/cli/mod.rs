@@ -15,6 +15,7 @@ mod progress;
 mod rebuild;
 mod summary;
 mod terminal;
+mod texture;
 mod verify;
 pub mod work;
 
@@ -71,6 +72,7 @@ fn run(arguments: &Arguments, work: &Work) -> Result<u8, Problem> {
         Command::Verify(verify) => verify::run(verify, global, work),
         Command::Rebuild(rebuild) => rebuild::run(rebuild, global, work),
         Command::Fit(fit) => fit::run(fit, global, work),
+        Command::Texture(texture) => texture::run(texture, global, work),
         Command::Init(init) => init::run(init, global),
     }
 }

@@ -2,6 +2,7 @@
 
 use affine_atlas::config::Config;
 use affine_atlas::config::assets::Asset;
+use affine_atlas::job::texture::TextureParams;
 use affine_atlas::observe::Observer;
 use affine_atlas::outcome::{AssetOutcome, Failure};
 use std::path::{Path, PathBuf};
@@ -25,6 +26,8 @@ pub struct Work {
     pub rebuild: fn(&RebuildRequest) -> Result<RebuildResult, Failure>,
     /// Fits spline surfaces to an asset's folder and writes them into another.
     pub fit: fn(&FitRequest) -> Result<FitResult, Failure>,
+    /// Lays a pattern over an asset's surface and writes the texture into a folder.
+    pub texture: fn(&TextureRequest) -> Result<TextureResult, Failure>,
     /// Removes folders that are being written. Called once before the program is stopped.
     pub remove_staging: fn(),
 }
@@ -107,6 +110,26 @@ pub struct FitRequest {
 
 /// What `fit` found.
 pub struct FitResult {
+    /// Figures: lines for a reader.
+    pub text: String,
+    /// The same for programs.
+    pub json: serde_json::Value,
+}
+
+/// What `texture` is asked for.
+pub struct TextureRequest {
+    /// An asset's folder.
+    pub folder: PathBuf,
+    /// Folder that holds the folder to write.
+    pub root: PathBuf,
+    /// Name of the folder to write.
+    pub name: String,
+    /// The pattern and how it is laid.
+    pub params: TextureParams,
+}
+
+/// What `texture` made.
+pub struct TextureResult {
     /// Figures: lines for a reader.
     pub text: String,
     /// The same for programs.

@@ -136,7 +136,7 @@ pub fn fit(folder: &Path, params: &FitParams) -> Result<FittedAsset, FitAssetErr
 }
 
 /// Its last part; a folder that is given as `.` has one, too.
-fn folder_name(folder: &Path) -> String {
+pub(super) fn folder_name(folder: &Path) -> String {
     let resolved = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
     let name = resolved.file_name().unwrap_or("surfaces".as_ref());
     name.to_string_lossy().into_owned()

@@ -3,7 +3,7 @@
 //! `build_component` is the pipeline of the tutorial (5.1) on one page, its first half on another (`flatten`): data only
 //! flows forward, and a finished value is never changed. [`build`] does it for every component of a mesh in memory, [`run`] for a file,
 //! [`inspect`] stops before the flow, [`survey`] tries different cones, [`rebuild`] goes back from images to a mesh, [`fit`] on to
-//! spline surfaces.
+//! spline surfaces, [`texture`] lays a pattern over the surface.
 
 mod error;
 pub mod fit;
@@ -12,6 +12,7 @@ mod inspect;
 mod listing;
 pub mod rebuild;
 pub mod survey;
+pub mod texture;
 
 pub use error::BuildError;
 pub use inspect::{Inspection, inspect};

@@ -308,7 +308,8 @@ pub fn read_surface(folder: &Path) -> Result<StoredSurface, FolderError> {
     })
 }
 
-fn document(path: &Path) -> Result<Document, FolderError> {
+/// `atlas.json`, once its format and version are known to be ours.
+pub(super) fn checked_json(path: &Path) -> Result<serde_json::Value, FolderError> {
     let of_file = |problem| FolderError::File {
         path: path.to_owned(),
         problem,
@@ -324,6 +325,15 @@ fn document(path: &Path) -> Result<Document, FolderError> {
             version: head.version,
         });
     }
+    Ok(value)
+}
+
+fn document(path: &Path) -> Result<Document, FolderError> {
+    let of_file = |problem| FolderError::File {
+        path: path.to_owned(),
+        problem,
+    };
+    let value = checked_json(path)?;
     let document = Document::deserialize(&value).map_err(|e| of_file(e.to_string()))?;
     for (row, patch) in document.patches.iter().enumerate() {
         if patch.id != row || !is_inside(&patch.image) {

@@ -18,6 +18,7 @@
 //! | `obj`, `off`, `ply`, `stl` | one format each |
 //! | `gltf` | glTF 2.0 and GLB with its compression extensions |
 //! | `atlas` | images and seams of a folder that a build wrote |
+//! | `flat` | flat coordinates and patches of such a folder |
 //! | `npz`, `exr`, `bounded` | the formats in such a folder |
 //!
 //! The four small formats are read here rather than by crates: none that we know gives errors with
@@ -28,6 +29,7 @@ pub(crate) mod bounded;
 mod build;
 mod error;
 pub(crate) mod exr;
+pub mod flat;
 mod folder;
 mod gltf;
 pub(crate) mod npz;

@@ -15,3 +15,4 @@ mod rectangles;
 mod refusals;
 mod replacing;
 mod survey;
+mod texture;

@@ -89,6 +89,8 @@ pub enum Contents {
     Cones,
     /// Spline surfaces.
     Fit,
+    /// Textures.
+    Texture,
 }
 
 impl Contents {
@@ -100,6 +102,7 @@ impl Contents {
             }
             Contents::Cones => name == "cones.json",
             Contents::Fit => name == "fit.json",
+            Contents::Texture => name == "texture.json",
         }
     }
 }

@@ -12,6 +12,7 @@
 mod materials;
 pub mod rebuilt;
 pub mod region;
+pub mod textured;
 mod vertices;
 
 use crate::atlas::patches::Domain;

@@ -2,12 +2,12 @@
 
 use crate::export::ExportError;
 use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId, NONE, VertexId, VertexVec};
-use crate::geometry::mesh::{AttributeKind, CornerAttribute, cross, norm, sub};
+use crate::geometry::mesh::{AttributeKind, CornerAttribute, Mesh, cross, norm, sub};
 use crate::product::AffineAtlas;
 
 /// Corners of one patch at one vertex of the slit disk are the same point; beyond this
 /// distance in the packed square they are kept apart all the same.
-const PACKED_TOLERANCE: f64 = 1e-6;
+pub(super) const PACKED_TOLERANCE: f64 = 1e-6;
 
 /// How far the length of a source tangent may be from 1.
 const TANGENT_TOLERANCE: f64 = 1e-2;
@@ -98,7 +98,7 @@ impl<'a> Splitter<'a> {
                 }
             }
         }
-        let (vertex_normal, face_normal) = normals(atlas);
+        let (vertex_normal, face_normal) = normals(&atlas.mesh);
         Ok(Self {
             atlas,
             sets,
@@ -341,14 +341,13 @@ fn finite(value: f32, default: f32) -> f32 {
     }
 }
 
-fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
+pub(super) fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
     let length = norm(v);
     (length.is_finite() && length > 0.0).then(|| v.map(|x| x / length))
 }
 
 /// Normals of vertices and faces, weighted by area, in units of the model's size so that nothing underflows.
-fn normals(atlas: &AffineAtlas) -> (VertexVec<[f64; 3]>, FaceVec<[f64; 3]>) {
-    let mesh = &atlas.mesh;
+pub(super) fn normals(mesh: &Mesh) -> (VertexVec<[f64; 3]>, FaceVec<[f64; 3]>) {
     let diagonal = mesh.diagonal();
     let scale = if diagonal > 0.0 { diagonal } else { 1.0 };
     let mut of_vertex = VertexVec::filled([0.0; 3], mesh.positions.len());

@@ -4,6 +4,7 @@
 //!
 //! * [`preview`]: the surface in space with a checkerboard in flat coordinates, cones and cut.
 //! * [`log_scale`]: the surface in space coloured by the log scale.
+//! * [`painted`]: any surface in space in colours of its own.
 //! * [`layout()`]: the central chart and the packed patches in the plane.
 //! * [`convergence()`]: curvature error against flow time (Fig. 7 of the tutorial).
 //! * [`Gallery`]: log scales of several metrics on one surface, side by side.
@@ -21,7 +22,7 @@
 mod canvas;
 mod checkerboard;
 mod coarse;
-mod colour;
+pub(crate) mod colour;
 mod convergence;
 mod floor;
 mod gallery;
@@ -39,12 +40,12 @@ mod view;
 pub use convergence::convergence;
 pub use gallery::{Gallery, Panel};
 pub use layout::layout;
-pub use surface::{log_scale, preview};
+pub use surface::{log_scale, painted, preview};
 
 use crate::export::ExportError;
 use crate::export::folder::Staging;
 use crate::product::AffineAtlas;
-use image::ImageEncoder;
+use image::{ImageBuffer, ImageEncoder, PixelWithColorType};
 
 /// Sides that pictures are held to, pixels: smaller ones show nothing, larger ones are a mistake.
 pub const SIDE_RANGE: [usize; 2] = [64, 8192];
@@ -85,16 +86,14 @@ pub fn write(
 }
 
 /// An image as a PNG file in memory.
-pub fn encode_png(image: &image::RgbImage) -> Result<Vec<u8>, image::ImageError> {
+pub fn encode_png<P>(image: &ImageBuffer<P, Vec<u8>>) -> Result<Vec<u8>, image::ImageError>
+where
+    P: image::Pixel<Subpixel = u8> + PixelWithColorType,
+{
     use image::codecs::png::{CompressionType, FilterType, PngEncoder};
     let mut bytes = Vec::new();
     PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive)
-        .write_image(
-            image.as_raw(),
-            image.width(),
-            image.height(),
-            image::ExtendedColorType::Rgb8,
-        )?;
+        .write_image(image.as_raw(), image.width(), image.height(), P::COLOR_TYPE)?;
     Ok(bytes)
 }
 

@@ -1,12 +1,13 @@
 //! Pictures of an atlas in space.
 
 use super::checkerboard::Checkerboard;
-use super::colour::{CUT, INK, NEGATIVE, POSITIVE};
+use super::colour::{CUT, INK, Linear, NEGATIVE, POSITIVE};
 use super::paint::Paint;
 use super::scale::{Range, Scale};
 use super::scene::Marks;
 use super::studio::{Props, Studio};
 use super::text::{self, Anchor};
+use crate::geometry::mesh::Mesh;
 use crate::product::AffineAtlas;
 use image::{Rgb, RgbImage};
 
@@ -23,6 +24,18 @@ pub fn preview(atlas: &AffineAtlas, size: usize) -> RgbImage {
 /// bar of colours; `size` × `size` pixels. The middle is the median over the area.
 pub fn log_scale(atlas: &AffineAtlas, size: usize) -> RgbImage {
     Portrait::new(atlas, size).log_scale()
+}
+
+/// A surface in colours of its own; `size` × `size` pixels. `colour` gets a face, the barycentric weights of a point in it and the size of a
+/// pixel there in source units, and gives linear light.
+pub fn painted(
+    mesh: &Mesh,
+    size: usize,
+    colour: &(dyn Fn(usize, [f64; 3], f64) -> Linear + Sync),
+) -> RgbImage {
+    let studio = Studio::new(mesh, size);
+    let props = studio.place(Marks::default());
+    studio.draw(&props, &Paint::Edged(colour))
 }
 
 /// Radius of a bar along the cut, in sides of the picture.
