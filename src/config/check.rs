@@ -68,7 +68,8 @@ fn unknown_key(
         Some((parent, _)) if keys::is_section(parent) => {
             keys::members(parent).map(|key| key.path).collect()
         }
-        _ => keys::sections(),
+        _ if section => keys::sections(),
+        _ => keys::above_sections().chain(keys::sections()).collect(),
     };
     ConfigError::UnknownKey {
         at: source.at(span),

@@ -4,6 +4,7 @@
 //! ranges are checked where the value was written, and `config.toml` states for each key exactly
 //! the line that [`Key::describe`] gives (a test asserts it).
 
+use super::presets;
 use std::fmt;
 
 /// What values a key takes. Bounds are inclusive.
@@ -95,7 +96,7 @@ impl fmt::Display for Kind {
 /// One key of the configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Key {
-    /// Section and name, `flow.scheme`; keys of listed tables are `cones.list[].vertex`.
+    /// Section and name, `flow.scheme`; keys of listed tables are `cones.list[].vertex`, keys above all sections a name alone.
     pub path: &'static str,
     /// Type and range.
     pub kind: Kind,
@@ -146,6 +147,7 @@ const VERTEX: Kind = Kind::Integer {
 
 /// Every key, in the order of `config.toml`.
 pub const KEYS: &[Key] = &[
+    key("preset", Kind::Choice(presets::WORDS), "", "absent"),
     key("input.paths", Kind::Texts, "", "[]"),
     key("output.folder", Kind::Text, "", "\"affine-atlas-out\""),
     key(
@@ -457,18 +459,25 @@ pub fn is_section(path: &str) -> bool {
     members(path).next().is_some()
 }
 
-/// The keys directly in a section, by their full paths. The empty path has no keys of its own.
+/// The keys directly in a section, by their full paths; those above all sections are not among them.
 pub fn members(section: &str) -> impl Iterator<Item = &'static Key> + use<'_> {
     KEYS.iter()
         .filter(move |key| key.path.rsplit_once('.').is_some_and(|(s, _)| s == section))
+}
+
+/// The keys that stand above all sections.
+pub fn above_sections() -> impl Iterator<Item = &'static str> {
+    (KEYS.iter().map(|key| key.path)).filter(|path| !path.contains('.'))
 }
 
 /// Names of all sections, in the order of `config.toml`.
 #[must_use]
 pub fn sections() -> Vec<&'static str> {
     let mut names = Vec::new();
-    for key in KEYS {
-        let name = key.path.split('.').next().unwrap_or(key.path);
+    for name in KEYS
+        .iter()
+        .filter_map(|key| Some(key.path.split_once('.')?.0))
+    {
         if !names.contains(&name) {
             names.push(name);
         }
@@ -563,7 +572,9 @@ mod tests {
             assert!(KEYS[i + 1..].iter().all(|b| a.path != b.path), "{}", a.path);
         }
         let runs = KEYS.chunk_by(|a, b| a.path.split('.').next() == b.path.split('.').next());
-        assert_eq!(runs.count(), sections().len());
+        let above = above_sections().count();
+        assert_eq!(runs.count(), above + sections().len());
+        assert!(sections().iter().all(|name| is_section(name)));
     }
 
     #[test]

@@ -3,6 +3,18 @@ use super::*;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+/// Keys that presets set: in the commented configuration they have no effect, so that presets have one.
+fn preset_keys() -> BTreeSet<String> {
+    let settings = Preset::ALL.map(Preset::settings);
+    let tables = settings.map(|text| toml::from_str::<toml::Table>(text).expect("TOML"));
+    tables.iter().flat_map(leaves).collect()
+}
+
+/// Section of a key, empty above all sections, and its name.
+fn section_and_name(path: &str) -> (&str, &str) {
+    path.rsplit_once('.').unwrap_or(("", path))
+}
+
 /// Paths of all leaves of a table, `section.key`.
 fn leaves(table: &toml::Table) -> BTreeSet<String> {
     let mut paths = BTreeSet::new();
@@ -48,7 +60,11 @@ fn key_table_default_and_commented_default_have_the_same_keys() {
         .collect();
     assert_eq!(known, leaves(&default_table()));
     let commented: toml::Table = toml::from_str(COMMENTED_DEFAULT).expect("parses");
-    assert_eq!(known, leaves(&commented));
+    let mut commented = leaves(&commented);
+    let of_presets = preset_keys();
+    assert!(!of_presets.is_empty() && commented.is_disjoint(&of_presets));
+    commented.extend(of_presets);
+    assert_eq!(known, commented);
 }
 
 #[test]
@@ -77,9 +93,9 @@ fn commented_default_describes_every_key() {
         }
         for key in KEYS
             .iter()
-            .filter(|key| key.path.split('.').next() == Some(section))
+            .filter(|key| section_and_name(key.path).0.split('.').next() == Some(section))
         {
-            let (parent, name) = key.path.rsplit_once('.').expect("section.key");
+            let (parent, name) = section_and_name(key.path);
             let description = format!("# {}", key.describe());
             // A key of listed tables has a paragraph of its own that begins with its name and that of the table.
             let table = match parent {
@@ -129,10 +145,18 @@ fn commented_examples_work() {
         else {
             continue;
         };
-        if keys::find(&format!("{section}.{name}")).is_none() {
+        let path = match section {
+            "" => name.to_owned(),
+            _ => format!("{section}.{name}"),
+        };
+        let Some(key) = keys::find(&path) else {
+            continue;
+        };
+        if preset_keys().contains(&path) {
+            assert_eq!(value, key.default, "{path}");
             continue;
         }
-        let config = commented_with(&format!("{section}.{name}"), value).expect(line);
+        let config = commented_with(&path, value).expect(line);
         assert_ne!(
             config.hash(),
             Config::default().hash(),
@@ -152,8 +176,10 @@ fn every_word_is_accepted_and_no_other_exists() {
         for word in words {
             commented_with(key.path, word).expect(key.path);
         }
-        let (section, name) = key.path.split_once('.').expect("section.key");
-        let text = format!("[{section}]\n{name} = \"no such word\"");
+        let text = match section_and_name(key.path) {
+            ("", name) => format!("{name} = \"no such word\""),
+            (section, name) => format!("[{section}]\n{name} = \"no such word\""),
+        };
         let message = toml::from_str::<Config>(&text)
             .expect_err("no such word")
             .message()
@@ -527,4 +553,93 @@ fn cone_files_that_are_refused() {
     std::fs::write(folder.path().join("my.cones.txt"), [b'3', 0xff]).expect("written");
     let text = load(&file, &[]).expect_err("no UTF-8").to_string();
     assert!(text.ends_with("byte 1 is not UTF-8 text"), "{text}");
+}
+
+#[test]
+fn every_word_is_a_preset_and_every_preset_changes_something() {
+    let word = |preset: &Preset| serde_json::to_value(preset).expect("a word");
+    assert_eq!(
+        Preset::ALL.iter().map(word).collect::<Vec<_>>(),
+        super::presets::WORDS
+    );
+    let parsed = |text: &str| parse("f", text, &[]).expect("parses");
+    let mut hashes = BTreeSet::from([Config::default().hash()]);
+    for (preset, word) in Preset::ALL.into_iter().zip(super::presets::WORDS) {
+        let named = parsed(&format!("preset = \"{word}\""));
+        assert_eq!(named.preset, Some(preset));
+        assert!(hashes.insert(named.hash()), "{word}");
+        // The effective values are handed on, not the word.
+        let written = toml::to_string(&named).expect("TOML");
+        assert!(!written.contains("preset"), "{written}");
+        let again = parsed(&written);
+        assert_eq!(
+            Config {
+                preset: None,
+                ..named
+            },
+            again
+        );
+        assert_eq!(again.hash(), parsed(preset.settings()).hash());
+    }
+}
+
+#[test]
+fn a_preset_lies_below_the_file_and_the_file_below_set() {
+    let budget = |text: &str, set: &[&str]| {
+        let set: Vec<String> = set.iter().map(|&s| s.to_owned()).collect();
+        parse("f", text, &set).expect("parses").patches.texel_budget
+    };
+    let named = "preset = \"geometry-image-256\"";
+    let both = "preset = \"geometry-image-256\"\n[patches]\ntexel_budget = 5000";
+    let file = "[patches]\ntexel_budget = 5000";
+    assert_eq!(budget(named, &[]), 65536);
+    assert_eq!(budget("", &["preset=geometry-image-256"]), 65536);
+    assert_eq!(
+        budget(COMMENTED_DEFAULT, &["preset=geometry-image-256"]),
+        65536
+    );
+    assert_eq!(budget(both, &[]), 5000);
+    assert_eq!(budget(file, &["preset=geometry-image-256"]), 5000);
+    assert_eq!(budget(both, &["patches.texel_budget=6000"]), 6000);
+    assert_eq!(budget(named, &["patches.texel_budget=6000"]), 6000);
+    // The last preset is the only one: nothing of another stays.
+    let other = parse("f", named, &["preset=texture".to_owned()]).expect("parses");
+    assert_eq!(
+        other.patches.texel_budget,
+        Config::default().patches.texel_budget
+    );
+    assert_eq!(other.cones.quantum.to_string(), "1/2");
+    // A key written with the value that it has by default counts as written.
+    assert_eq!(
+        budget(
+            "preset = \"spline-fit\"\n[patches]\ntexel_budget = 262144",
+            &[]
+        ),
+        262144
+    );
+}
+
+#[test]
+fn an_unknown_preset_is_refused_with_the_known_ones() {
+    let error = parse("f", "preset = \"best\"", &[]).expect_err("unknown");
+    assert_eq!(error.to_string(), "f:1:10: `preset` has no choice \"best\"");
+    for word in super::presets::WORDS {
+        assert!(
+            error.remedy().contains(&format!("\"{word}\"")),
+            "{}",
+            error.remedy()
+        );
+    }
+    let error = parse("f", "", &["preset=textur".to_owned()]).expect_err("unknown");
+    assert!(
+        error
+            .remedy()
+            .starts_with("did you mean \"texture\"? Allowed: "),
+        "{}",
+        error.remedy()
+    );
+    let error = parse("f", "[preset]\nname = 1", &[]).expect_err("a section");
+    assert!(matches!(error, ConfigError::WrongType { .. }), "{error}");
+    let error = parse("f", "prest = \"texture\"", &[]).expect_err("misspelt");
+    assert_eq!(error.remedy(), "did you mean `preset`?");
 }
