@@ -214,7 +214,7 @@ fn unknown_preset() {
     1 | preset = "best"
       :          ^^^^^^
       `----
-     help: allowed: "spline-fit", "geometry-image-256" or "texture"
+     help: allowed: "spline-fit", "geometry-image-256", "omage-1024" or "texture"
     "#);
 }
 

@@ -158,6 +158,11 @@ fn check_value(
                 check_value(source, path, Kind::Text, item, errors);
             }
         }
+        (Kind::Choices(words), DeValue::Array(items)) => {
+            for item in items {
+                check_value(source, path, Kind::Choice(words), item, errors);
+            }
+        }
         (Kind::Curvatures, DeValue::Array(items)) => {
             for item in items {
                 check_value(source, path, Kind::Curvature, item, errors);

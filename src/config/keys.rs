@@ -39,6 +39,8 @@ pub enum Kind {
     Text,
     /// A list of texts.
     Texts,
+    /// A list of words of a list.
+    Choices(&'static [&'static str]),
     /// A curvature in multiples of π: a number, or a fraction as text.
     Curvature,
     /// The same, held to a range of multiples of π.
@@ -63,7 +65,10 @@ impl fmt::Display for Kind {
             Self::Integer { min, max } => write!(f, "an integer from {min} to {max}"),
             Self::Number { min, max } => write!(f, "a number from {min:?} to {max:?}"),
             Self::ZeroOr { min, max } => write!(f, "0.0, or a number from {min:?} to {max:?}"),
-            Self::Choice(words) => {
+            Self::Choice(words) | Self::Choices(words) => {
+                if matches!(self, Self::Choices(_)) {
+                    write!(f, "a list of ")?;
+                }
                 for (i, word) in words.iter().enumerate() {
                     match i {
                         0 => {}
@@ -427,10 +432,45 @@ pub const KEYS: &[Key] = &[
         "2",
     ),
     key(
+        "patches.max_count",
+        Kind::Integer {
+            min: 1,
+            max: 1_000_000,
+        },
+        "patches",
+        "absent",
+    ),
+    key(
+        "patches.packed_side",
+        Kind::Integer { min: 64, max: 8192 },
+        "texels",
+        "absent",
+    ),
+    key(
         "images.domain",
         Kind::Choice(&["flat", "rectangle"]),
         "",
         "\"flat\"",
+    ),
+    key(
+        "images.channels",
+        Kind::Choices(&[
+            "normal",
+            "face",
+            "log-scale",
+            "source-normal",
+            "color",
+            "texcoord",
+            "material",
+        ]),
+        "",
+        "[\"normal\", \"face\", \"log-scale\"]",
+    ),
+    key(
+        "images.normal_precision",
+        Kind::Choice(&["float", "half"]),
+        "",
+        "\"float\"",
     ),
     key("pictures.enabled", Kind::Bool, "", "true"),
     key(

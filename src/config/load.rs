@@ -4,6 +4,7 @@ use super::Config;
 use super::check::{Source, check};
 use super::error::{ConfigError, Location};
 use super::presets::Preset;
+use crate::atlas::patches::Domain;
 use crate::flow::cones;
 use std::io::Read;
 use std::ops::Range;
@@ -126,7 +127,11 @@ pub fn parse(name: &str, text: &str, overrides: &[String]) -> Result<Config, Con
     merge(&mut merged, own);
     // Each layer was accepted alone and a key is replaced as a whole, so this can only fail where
     // a stage relates several of its keys.
-    Config::deserialize_table(merged).map_err(|error| refused(&last, &error))
+    let config = Config::deserialize_table(merged).map_err(|error| refused(&last, &error))?;
+    match (config.images.domain, config.patches.packed_side) {
+        (Domain::Rectangle, Some(_)) => Err(ConfigError::PackedRectangles),
+        _ => Ok(config),
+    }
 }
 
 /// What the preset sets, if one is named: it lies below everything that the user wrote, wherever its name stands.

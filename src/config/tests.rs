@@ -436,6 +436,7 @@ fn hash_depends_on_values_that_change_a_result() {
             Kind::Integer { max, .. } => max.to_string(),
             Kind::Number { max, .. } | Kind::ZeroOr { max, .. } => format!("{max:?}"),
             Kind::Choice(words) => words[words.len() - 1].to_owned(),
+            Kind::Choices(words) => format!("[\"{}\"]", words[0]),
             _ => continue,
         };
         let changed = commented_with(key.path, &value).expect(key.path).hash();
@@ -642,4 +643,38 @@ fn an_unknown_preset_is_refused_with_the_known_ones() {
     assert!(matches!(error, ConfigError::WrongType { .. }), "{error}");
     let error = parse("f", "prest = \"texture\"", &[]).expect_err("misspelt");
     assert_eq!(error.remedy(), "did you mean `preset`?");
+}
+
+#[test]
+fn channels_are_a_set_of_known_words() {
+    let parsed = |list: &str| parse("f", &format!("[images]\nchannels = {list}"), &[]);
+    let hash = |list: &str| parsed(list).expect("parses").hash();
+    assert_eq!(
+        hash("[\"log-scale\", \"normal\", \"face\", \"normal\"]"),
+        Config::default().hash()
+    );
+    assert_ne!(hash("[]"), Config::default().hash());
+    let Some(Kind::Choices(words)) = keys::find("images.channels").map(|key| key.kind) else {
+        panic!("a list of words");
+    };
+    for word in words {
+        let channels = parsed(&format!("[{word:?}]"))
+            .expect("known")
+            .images
+            .channels;
+        let names: Vec<&str> = channels.iter().map(|channel| channel.name()).collect();
+        assert_eq!(names, [*word]);
+    }
+    let error = parsed("[\"normal\", \"colour\"]").expect_err("unknown");
+    assert_eq!(
+        error.to_string(),
+        "f:2:23: `images.channels` has no choice \"colour\""
+    );
+    assert!(
+        error.remedy().starts_with("did you mean \"color\"?"),
+        "{}",
+        error.remedy()
+    );
+    let error = parsed("\"normal\"").expect_err("no list");
+    assert!(matches!(error, ConfigError::WrongType { .. }), "{error}");
 }

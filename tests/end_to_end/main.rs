@@ -2,6 +2,7 @@
 
 mod arrays;
 mod boundaries;
+mod channels;
 mod command;
 mod existence;
 mod fit;

@@ -37,6 +37,7 @@ use crate::atlas::overlay::Layout;
 use crate::atlas::plane::Similarity;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, PatchId};
 use crate::geometry::mesh::Mesh;
+use rectangle::Oriented;
 pub(crate) use seams::seams;
 use slit::Slit;
 #[cfg(test)]
@@ -44,6 +45,11 @@ pub(crate) use slit::own_development_error;
 
 /// Most texels on a side of an image.
 pub const MAX_SIDE: usize = 8192;
+
+/// Fewer texels on a side of the packed image hold no patches worth the name.
+const LEAST_PACKED_SIDE: usize = 64;
+/// A range of log scales that bounds nothing: lengths differ by a factor of 5·10²¹.
+const WIDEST_RANGE: f64 = 50.0;
 
 /// The domain of one geometry image.
 #[derive(Clone, Debug, PartialEq)]
@@ -128,6 +134,17 @@ pub struct PatchLayout {
     pub patches: Vec<Patch>,
     /// Their common borders.
     pub seams: Vec<Seam>,
+    /// Where flat images lie in one image of all, if one was asked for.
+    pub packed: Option<PackedPlaces>,
+}
+
+/// The packed square as an image: texel for texel the images of the patches, each in a place of its own.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PackedPlaces {
+    /// Columns and rows. The unit square of packed coordinates is all of it.
+    pub side: usize,
+    /// Column and row, from the top, of the upper left texel of each image.
+    pub corners: Vec<[usize; 2]>,
 }
 
 /// Parameters of patches and packing.
@@ -143,6 +160,10 @@ pub struct PatchParams {
     pub min_side: usize,
     /// Texels between patches in the packed square, and around each image.
     pub padding: usize,
+    /// Most patches: where there are more, `log_scale_range` is doubled until there are not, or it is [`WIDEST_RANGE`].
+    pub max_count: Option<usize>,
+    /// Columns and rows of one image of all flat patches. Patches get fewer texels than the budget has where they would not fit.
+    pub packed_side: Option<usize>,
 }
 
 impl Default for PatchParams {
@@ -152,6 +173,8 @@ impl Default for PatchParams {
             texel_budget: 512 * 512,
             min_side: 16,
             padding: 2,
+            max_count: None,
+            packed_side: None,
         }
     }
 }
@@ -191,6 +214,13 @@ impl PatchParams {
             ("texel_budget", self.texel_budget as f64, 1.0, 1e9),
             ("min_side", self.min_side as f64, 1.0, 4096.0),
             ("padding", self.padding as f64, 0.0, 64.0),
+            ("max_count", self.max_count.unwrap_or(1) as f64, 1.0, 1e9),
+            (
+                "packed_side",
+                self.packed_side.unwrap_or(LEAST_PACKED_SIDE) as f64,
+                LEAST_PACKED_SIDE as f64,
+                MAX_SIDE as f64,
+            ),
         ];
         for (name, value, least, most) in bounds {
             if !(least..=most).contains(&value) {
@@ -235,7 +265,7 @@ pub fn layout(
         }
     }
     let slit = Slit::new(mesh, length, cut, development, under);
-    let sets = segment::segment(&slit, params.log_scale_range);
+    let sets = segment_into(&slit, params);
     let mut face_patch = FaceVec::filled(PatchId::new(0), c.face_count());
     let mut uv = FaceVec::filled([[0.0; 2]; 3], c.face_count());
     let mut own = vec![[0.0; 2]; development.copies];
@@ -250,16 +280,12 @@ pub fn layout(
     }
     let area = |faces: &Vec<FaceId>| faces.iter().map(|&f| slit.source_area[f]).sum();
     let source_area: Vec<f64> = sets.iter().map(area).collect();
-    let rasters = resolution::rasters(&oriented, &source_area, params);
-    // In the packed square every patch has its image's density, on square texels.
-    let sizes: Vec<[usize; 2]> = oriented
-        .iter()
-        .zip(&rasters)
-        .map(|(patch, raster)| {
-            let rows = (raster.density * patch.height - 1e-6).ceil().max(1.0);
-            [raster.width, (rows + 2.0 * raster.margin).round() as usize]
-        })
-        .collect();
+    let Placed {
+        rasters,
+        sizes,
+        corners,
+        side,
+    } = place(&oriented, &source_area, params);
     let contents: Vec<[f64; 2]> = oriented
         .iter()
         .zip(&rasters)
@@ -268,7 +294,7 @@ pub fn layout(
     let patches = oriented
         .iter()
         .zip(&rasters)
-        .zip(packed(&sizes, &contents))
+        .zip(in_square(&sizes, &contents, &corners, side))
         .map(|((patch, raster), (packed_scale, packed_offset))| Patch {
             to_chart: Some(patch.to_chart),
             width: raster.width,
@@ -278,21 +304,123 @@ pub fn layout(
             packed_offset,
         })
         .collect();
+    let packed = params.packed_side.map(|_| PackedPlaces {
+        side,
+        corners: (rasters.iter().zip(&sizes).zip(&corners))
+            .map(|((raster, size), corner)| {
+                // In the middle of its box, which is higher only where rows are not as far apart as columns.
+                let above = (size[1] - raster.height.min(size[1])) / 2;
+                [corner[0], side - corner[1] - size[1] + above]
+            })
+            .collect(),
+    });
     let seams = seams(mesh, &cut.is_cut, &face_patch, &uv);
     Ok(PatchLayout {
         face_patch,
         uv,
         patches,
         seams,
+        packed,
     })
+}
+
+/// The patches' faces: at most `max_count`, as far as the range of scale decides about that.
+fn segment_into(slit: &Slit, params: &PatchParams) -> Vec<Vec<FaceId>> {
+    let mut range = params.log_scale_range;
+    let mut sets = segment::segment(slit, range);
+    while params.max_count.is_some_and(|most| sets.len() > most) && range < WIDEST_RANGE {
+        range = (2.0 * range).min(WIDEST_RANGE);
+        let fewer = segment::segment(slit, range);
+        if fewer.len() < sets.len() {
+            sets = fewer;
+        }
+    }
+    sets
+}
+
+/// Rasters with their boxes in the packed square, and its side, in texels; corners count from the lower left.
+struct Placed {
+    rasters: Vec<resolution::Raster>,
+    sizes: Vec<[usize; 2]>,
+    corners: Vec<[usize; 2]>,
+    side: usize,
+}
+
+impl Placed {
+    fn with_budget(patches: &[Oriented], source_area: &[f64], params: &PatchParams) -> Self {
+        let rasters = resolution::rasters(patches, source_area, params);
+        // In the packed square every patch has its image's density, on square texels.
+        let sizes: Vec<[usize; 2]> = patches
+            .iter()
+            .zip(&rasters)
+            .map(|(patch, raster)| {
+                let rows = (raster.density * patch.height - 1e-6).ceil().max(1.0);
+                let rows = (rows + 2.0 * raster.margin).round() as usize;
+                match params.packed_side {
+                    // The image itself must find room.
+                    Some(_) => [raster.width, rows.max(raster.height)],
+                    None => [raster.width, rows],
+                }
+            })
+            .collect();
+        let fitting = params.packed_side.and_then(|side| {
+            let corners = packing::pack_into(&sizes, side)?;
+            Some((corners, side))
+        });
+        let (corners, side) = fitting.unwrap_or_else(|| packing::pack(&sizes));
+        Self {
+            rasters,
+            sizes,
+            corners,
+            side,
+        }
+    }
+}
+
+/// Gives the patches as many texels as the budget has, or, where a side is asked for, as fit; the least that patches must have may be more.
+fn place(patches: &[Oriented], source_area: &[f64], params: &PatchParams) -> Placed {
+    let with = |texel_budget: usize| {
+        let params = PatchParams {
+            texel_budget,
+            ..params.clone()
+        };
+        Placed::with_budget(patches, source_area, &params)
+    };
+    let whole = with(params.texel_budget);
+    let Some(most) = params.packed_side.filter(|&most| whole.side > most) else {
+        return whole;
+    };
+    let (mut low, mut high) = (1, params.texel_budget);
+    let mut best = with(low);
+    // Within a thousandth of the greatest budget that fits.
+    while best.side <= most && high - low > 1 + low / 1024 {
+        let middle = low + (high - low) / 2;
+        let tried = with(middle);
+        if tried.side <= most {
+            (low, best) = (middle, tried);
+        } else {
+            high = middle;
+        }
+    }
+    best
 }
 
 /// Places contents (width, height) in the middle of their boxes, packed into a square: the part of the square that a unit of the
 /// content's width is, and where its lower left corner lies in the unit square.
 pub(crate) fn packed(sizes: &[[usize; 2]], contents: &[[f64; 2]]) -> Vec<(f64, [f64; 2])> {
     let (corners, side) = packing::pack(sizes);
+    in_square(sizes, contents, &corners, side)
+}
+
+/// The same for boxes that have their places.
+fn in_square(
+    sizes: &[[usize; 2]],
+    contents: &[[f64; 2]],
+    corners: &[[usize; 2]],
+    side: usize,
+) -> Vec<(f64, [f64; 2])> {
     let side = side as f64;
-    let boxes = sizes.iter().zip(&corners).zip(contents);
+    let boxes = sizes.iter().zip(corners).zip(contents);
     boxes
         .map(|((size, corner), content)| {
             let place = |i: usize| corner[i] as f64 + 0.5 * (size[i] as f64 - content[i]);
