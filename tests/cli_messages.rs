@@ -219,6 +219,15 @@ fn unknown_preset() {
 }
 
 #[test]
+fn packed_rectangles() {
+    let text = "preset = \"omage-1024\"\n[images]\ndomain = \"rectangle\"\n";
+    insta::assert_snapshot!(config_refusal(text), @r#"
+     error: `patches.packed_side` packs flat images into one, but `images.domain` is "rectangle"
+     help: set `images.domain = "flat"`, or leave `patches.packed_side` out
+    "#);
+}
+
+#[test]
 fn wrong_type() {
     insta::assert_snapshot!(config_refusal("[patches]\ntexel_budget = \"512x512\"\n"), @r#"
      error: `patches.texel_budget` takes an integer from 4096 to 1073741824, but was given the text

@@ -57,10 +57,10 @@ pub(super) fn check(
             let mut tally = Tally::default();
             match read(&folder.join(&patch.image), patch, &mut tally) {
                 Ok(Some(image)) => {
-                    if document.is_generated() {
-                        if let Some(what) = channels::lacking(&image, &document.images) {
-                            tally.layout.get_or_insert(what);
-                        }
+                    if document.is_generated()
+                        && let Some(what) = channels::lacking(&image, &document.images)
+                    {
+                        tally.layout.get_or_insert(what);
                     }
                     tally.infinite += channels::infinite(&image);
                     tally.wrong_source_normal =

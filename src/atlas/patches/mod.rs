@@ -6,8 +6,8 @@
 //! *Guaranteed:* every face is in one patch; a patch is connected across edges that are not cut,
 //! a topological disk, and injective in the plane (up to 1e-10 of its extent); its regional log scale
 //! (½ ln(flat area / source area), averaged over the stars of a face's corners) stays within
-//! [`PatchParams::log_scale_range`]; its image holds it with a margin and covers at least a few texel
-//! centres; patch → chart is a similarity without reflection. The same for any number of threads, and the
+//! [`PatchParams::log_scale_range`], or what [`PatchParams::max_count`] made of it; its image holds it with
+//! a margin and covers at least a few texel centres; patch → chart is a similarity without reflection. The same for any number of threads, and the
 //! same patches under changes of the input's last digits.
 //! *Not guaranteed:* the least number of patches, and the range for the log scale of single faces: a
 //! sliver differs from its surroundings by any amount.
