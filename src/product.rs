@@ -3,7 +3,7 @@
 use crate::atlas::charts::Charts;
 use crate::atlas::cut::CutGraph;
 use crate::atlas::develop::Development;
-use crate::atlas::geometry_image::GeometryImage;
+use crate::atlas::geometry_image::{GeometryImage, ImageParams};
 use crate::atlas::patches::PatchLayout;
 use crate::flow::cones::Prescription;
 use crate::flow::ricci::{FlatMetric, FlowParams};
@@ -34,6 +34,8 @@ pub struct AffineAtlas {
     pub patches: PatchLayout,
     /// One image a patch.
     pub images: Vec<GeometryImage>,
+    /// What of them is stored, and how.
+    pub image_params: ImageParams,
     /// Added to image positions to give source coordinates.
     pub image_origin: [f64; 3],
     /// What repair changed: counts by name, as `atlas.json` lists them.

@@ -207,6 +207,27 @@ fn unknown_choice() {
 }
 
 #[test]
+fn unknown_preset() {
+    insta::assert_snapshot!(config_refusal("preset = \"best\"\n"), @r#"
+     error: `preset` has no choice "best"
+      ,-[config.toml:1:10]
+    1 | preset = "best"
+      :          ^^^^^^
+      `----
+     help: allowed: "spline-fit", "geometry-image-256", "omage-1024" or "texture"
+    "#);
+}
+
+#[test]
+fn packed_rectangles() {
+    let text = "preset = \"omage-1024\"\n[images]\ndomain = \"rectangle\"\n";
+    insta::assert_snapshot!(config_refusal(text), @r#"
+     error: `patches.packed_side` packs flat images into one, but `images.domain` is "rectangle"
+     help: set `images.domain = "flat"`, or leave `patches.packed_side` out
+    "#);
+}
+
+#[test]
 fn wrong_type() {
     insta::assert_snapshot!(config_refusal("[patches]\ntexel_budget = \"512x512\"\n"), @r#"
      error: `patches.texel_budget` takes an integer from 4096 to 1073741824, but was given the text

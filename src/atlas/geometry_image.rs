@@ -6,9 +6,16 @@
 //! point there: the faces are rasterised one by one, positions are interpolated on the face in `f64`
 //! and rounded once. A centre on an edge belongs to the lower face. Outside, every channel is that of
 //! the nearest covered texel (of several the one further left, then further up), so no value is ever
-//! missing. Along a side that two rectangles share both images hold the same points (`shared`). The same for any number of threads.
+//! missing. Attributes of the source come in a second pass (`attributes`). Along a side that two rectangles share both images hold the same points (`shared`). The same for any number of threads.
 
+mod attributes;
+mod channels;
+mod packed;
 mod shared;
+
+pub use attributes::{Sampled, SourceSurface, Values, sample_attributes};
+pub use channels::{Channel, ImageParams, Precision};
+pub use packed::pack_images;
 
 use crate::atlas::patches::raster::{cover, to_texel};
 use crate::atlas::patches::{Domain, Patch, PatchLayout};
@@ -35,6 +42,8 @@ pub struct GeometryImage {
     pub face: Vec<u32>,
     /// Log scale, interpolated; dilated.
     pub log_scale: Vec<f32>,
+    /// Attributes of the source, where they were asked for ([`sample_attributes`]); dilated.
+    pub attributes: Vec<Sampled>,
 }
 
 /// A model farther from the origin than this many diagonals of its bounding box gets an image origin.
@@ -174,6 +183,7 @@ fn sample_patch(
         normal: vec![[0.0, 0.0, 1.0]; count],
         face: vec![NONE; count],
         log_scale: vec![0.0; count],
+        attributes: Vec::new(),
     };
     let texels = |f: FaceId| layout.uv[f].map(|p| in_texels(patch, p));
     for &f in faces {

@@ -68,7 +68,8 @@ fn unknown_key(
         Some((parent, _)) if keys::is_section(parent) => {
             keys::members(parent).map(|key| key.path).collect()
         }
-        _ => keys::sections(),
+        _ if section => keys::sections(),
+        _ => keys::above_sections().chain(keys::sections()).collect(),
     };
     ConfigError::UnknownKey {
         at: source.at(span),
@@ -155,6 +156,11 @@ fn check_value(
         (Kind::Texts, DeValue::Array(items)) => {
             for item in items {
                 check_value(source, path, Kind::Text, item, errors);
+            }
+        }
+        (Kind::Choices(words), DeValue::Array(items)) => {
+            for item in items {
+                check_value(source, path, Kind::Choice(words), item, errors);
             }
         }
         (Kind::Curvatures, DeValue::Array(items)) => {

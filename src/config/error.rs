@@ -185,6 +185,11 @@ pub enum ConfigError {
     /// Both ways of naming cones.
     #[error("`cones.list` and `cones.file` both name cones")]
     ListAndFile,
+    /// One image of all patches, but patches that are not flat.
+    #[error(
+        "`patches.packed_side` packs flat images into one, but `images.domain` is \"rectangle\""
+    )]
+    PackedRectangles,
     /// A value that the stage itself refuses.
     #[error("{at}: `{key}` is not usable: {reason}")]
     Refused {
@@ -207,6 +212,7 @@ impl ConfigError {
             | Self::TooLong { .. }
             | Self::NoConeFile { .. }
             | Self::ListAndFile
+            | Self::PackedRectangles
             | Self::OverrideWithoutValue { .. } => None,
             Self::Syntax { at, .. }
             | Self::ConeLine { at, .. }
@@ -242,6 +248,9 @@ impl ConfigError {
                  radians, for example `17 1.570796`; `cones.file_first_vertex` says where numbers begin"
                 .to_owned(),
             Self::ListAndFile => "remove one of them".to_owned(),
+            Self::PackedRectangles => {
+                "set `images.domain = \"flat\"`, or leave `patches.packed_side` out".to_owned()
+            }
             Self::Syntax { .. } => {
                 "texts need quotes, lists need [ ], and each key stands once, on its own line"
                     .to_owned()

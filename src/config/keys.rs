@@ -4,6 +4,7 @@
 //! ranges are checked where the value was written, and `config.toml` states for each key exactly
 //! the line that [`Key::describe`] gives (a test asserts it).
 
+use super::presets;
 use std::fmt;
 
 /// What values a key takes. Bounds are inclusive.
@@ -38,6 +39,8 @@ pub enum Kind {
     Text,
     /// A list of texts.
     Texts,
+    /// A list of words of a list.
+    Choices(&'static [&'static str]),
     /// A curvature in multiples of π: a number, or a fraction as text.
     Curvature,
     /// The same, held to a range of multiples of π.
@@ -62,7 +65,10 @@ impl fmt::Display for Kind {
             Self::Integer { min, max } => write!(f, "an integer from {min} to {max}"),
             Self::Number { min, max } => write!(f, "a number from {min:?} to {max:?}"),
             Self::ZeroOr { min, max } => write!(f, "0.0, or a number from {min:?} to {max:?}"),
-            Self::Choice(words) => {
+            Self::Choice(words) | Self::Choices(words) => {
+                if matches!(self, Self::Choices(_)) {
+                    write!(f, "a list of ")?;
+                }
                 for (i, word) in words.iter().enumerate() {
                     match i {
                         0 => {}
@@ -95,7 +101,7 @@ impl fmt::Display for Kind {
 /// One key of the configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Key {
-    /// Section and name, `flow.scheme`; keys of listed tables are `cones.list[].vertex`.
+    /// Section and name, `flow.scheme`; keys of listed tables are `cones.list[].vertex`, keys above all sections a name alone.
     pub path: &'static str,
     /// Type and range.
     pub kind: Kind,
@@ -146,6 +152,7 @@ const VERTEX: Kind = Kind::Integer {
 
 /// Every key, in the order of `config.toml`.
 pub const KEYS: &[Key] = &[
+    key("preset", Kind::Choice(presets::WORDS), "", "absent"),
     key("input.paths", Kind::Texts, "", "[]"),
     key("output.folder", Kind::Text, "", "\"affine-atlas-out\""),
     key(
@@ -425,10 +432,45 @@ pub const KEYS: &[Key] = &[
         "2",
     ),
     key(
+        "patches.max_count",
+        Kind::Integer {
+            min: 1,
+            max: 1_000_000,
+        },
+        "patches",
+        "absent",
+    ),
+    key(
+        "patches.packed_side",
+        Kind::Integer { min: 64, max: 8192 },
+        "texels",
+        "absent",
+    ),
+    key(
         "images.domain",
         Kind::Choice(&["flat", "rectangle"]),
         "",
         "\"flat\"",
+    ),
+    key(
+        "images.channels",
+        Kind::Choices(&[
+            "normal",
+            "face",
+            "log-scale",
+            "source-normal",
+            "color",
+            "texcoord",
+            "material",
+        ]),
+        "",
+        "[\"normal\", \"face\", \"log-scale\"]",
+    ),
+    key(
+        "images.normal_precision",
+        Kind::Choice(&["float", "half"]),
+        "",
+        "\"float\"",
     ),
     key("pictures.enabled", Kind::Bool, "", "true"),
     key(
@@ -457,18 +499,25 @@ pub fn is_section(path: &str) -> bool {
     members(path).next().is_some()
 }
 
-/// The keys directly in a section, by their full paths. The empty path has no keys of its own.
+/// The keys directly in a section, by their full paths; those above all sections are not among them.
 pub fn members(section: &str) -> impl Iterator<Item = &'static Key> + use<'_> {
     KEYS.iter()
         .filter(move |key| key.path.rsplit_once('.').is_some_and(|(s, _)| s == section))
+}
+
+/// The keys that stand above all sections.
+pub fn above_sections() -> impl Iterator<Item = &'static str> {
+    (KEYS.iter().map(|key| key.path)).filter(|path| !path.contains('.'))
 }
 
 /// Names of all sections, in the order of `config.toml`.
 #[must_use]
 pub fn sections() -> Vec<&'static str> {
     let mut names = Vec::new();
-    for key in KEYS {
-        let name = key.path.split('.').next().unwrap_or(key.path);
+    for name in KEYS
+        .iter()
+        .filter_map(|key| Some(key.path.split_once('.')?.0))
+    {
         if !names.contains(&name) {
             names.push(name);
         }
@@ -563,7 +612,9 @@ mod tests {
             assert!(KEYS[i + 1..].iter().all(|b| a.path != b.path), "{}", a.path);
         }
         let runs = KEYS.chunk_by(|a, b| a.path.split('.').next() == b.path.split('.').next());
-        assert_eq!(runs.count(), sections().len());
+        let above = above_sections().count();
+        assert_eq!(runs.count(), above + sections().len());
+        assert!(sections().iter().all(|name| is_section(name)));
     }
 
     #[test]

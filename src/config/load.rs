@@ -3,8 +3,11 @@
 use super::Config;
 use super::check::{Source, check};
 use super::error::{ConfigError, Location};
+use super::presets::Preset;
+use crate::atlas::patches::Domain;
 use crate::flow::cones;
 use std::io::Read;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use toml::de::DeTable;
@@ -33,7 +36,7 @@ impl Loaded {
     }
 }
 
-/// Reads a configuration file and applies overrides of the form `section.key=value`.
+/// Reads a configuration file and applies overrides of the form `section.key=value`. A preset lies below both.
 ///
 /// # Errors
 /// [`ConfigError`] where the file cannot be read, is no TOML, or holds a key, type or value that
@@ -114,15 +117,37 @@ pub fn parse(name: &str, text: &str, overrides: &[String]) -> Result<Config, Con
         name: name.to_owned(),
         text: Arc::from(text),
     };
-    let mut merged = parse_layer(&file)?;
+    let mut own = parse_layer(&file)?;
     let mut last = file;
     for given in overrides {
         last = override_source(given)?;
-        merge(&mut merged, parse_layer(&last)?);
+        merge(&mut own, parse_layer(&last)?);
     }
+    let mut merged = preset_layer(&own)?;
+    merge(&mut merged, own);
     // Each layer was accepted alone and a key is replaced as a whole, so this can only fail where
     // a stage relates several of its keys.
-    Config::deserialize_table(merged).map_err(|error| refused(&last, &error))
+    let config = Config::deserialize_table(merged).map_err(|error| refused(&last, &error))?;
+    match (config.images.domain, config.patches.packed_side) {
+        (Domain::Rectangle, Some(_)) => Err(ConfigError::PackedRectangles),
+        _ => Ok(config),
+    }
+}
+
+/// What the preset sets, if one is named: it lies below everything that the user wrote, wherever its name stands.
+fn preset_layer(own: &toml::Table) -> Result<toml::Table, ConfigError> {
+    let Some(preset) = own.get("preset").cloned() else {
+        return Ok(toml::Table::new());
+    };
+    let text = match preset.try_into::<Preset>() {
+        Ok(preset) => preset.settings(),
+        // Each layer was accepted, so the word is known.
+        Err(_) => "",
+    };
+    parse_layer(&Source {
+        name: "preset".to_owned(),
+        text: Arc::from(text),
+    })
 }
 
 impl Config {
@@ -191,12 +216,21 @@ fn refused(source: &Source, error: &toml::de::Error) -> ConfigError {
     }
 }
 
-/// Path of the `section.key` whose value holds byte `position`.
+/// Path of the `section.key`, or of the key above all sections, whose value holds byte `position`.
 fn key_at(source: &Source, position: usize) -> Option<String> {
     let table = DeTable::parse(&source.text).ok()?;
+    let holds = |key: Range<usize>, value: Range<usize>| {
+        (key.start..value.end.max(key.end)).contains(&position)
+    };
     for (section, keys) in table.get_ref() {
-        for (key, value) in keys.get_ref().as_table()? {
-            if (key.span().start..value.span().end.max(key.span().end)).contains(&position) {
+        let Some(members) = keys.get_ref().as_table() else {
+            if holds(section.span(), keys.span()) {
+                return Some(section.get_ref().to_string());
+            }
+            continue;
+        };
+        for (key, value) in members {
+            if holds(key.span(), value.span()) {
                 return Some(format!("{}.{}", section.get_ref(), key.get_ref()));
             }
         }

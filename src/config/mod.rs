@@ -13,10 +13,12 @@ mod check;
 pub mod error;
 pub mod keys;
 mod load;
+mod presets;
 mod sections;
 
 pub use error::{ConfigError, Location};
 pub use load::{Loaded, defaults, load, parse};
+pub use presets::Preset;
 pub use sections::*;
 
 use serde::{Deserialize, Serialize};
@@ -30,6 +32,9 @@ pub const COMMENTED_DEFAULT: &str = include_str!("../../config.toml");
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
+    /// Which preset gave defaults; its values are in the other fields already, so it is never written.
+    #[serde(skip_serializing)]
+    pub preset: Option<Preset>,
     /// Which meshes.
     pub input: InputParams,
     /// Where the atlases go.
@@ -72,6 +77,7 @@ impl Config {
             input: InputParams::default(),
             output: OutputParams::default(),
             run: RunParams::default(),
+            preset: None,
             ..self.clone()
         }
     }

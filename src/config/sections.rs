@@ -1,11 +1,11 @@
 //! The sections of [`Config`](super::Config).
 //!
-//! Most are the stages' own parameters; `[input]`, `[output]`, `[images]`, `[pictures]` and `[run]` belong here.
+//! Most are the stages' own parameters; `[input]`, `[output]`, `[pictures]` and `[run]` belong here.
 
-use crate::atlas::patches::Domain;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
+pub use crate::atlas::geometry_image::ImageParams;
 pub use crate::atlas::patches::PatchParams;
 pub use crate::flow::cones::{BoundaryParams, ConeParams};
 pub use crate::flow::refine::RefineParams;
@@ -36,14 +36,6 @@ impl Default for OutputParams {
             folder: PathBuf::from("affine-atlas-out"),
         }
     }
-}
-
-/// `[images]`: geometry images.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ImageParams {
-    /// What an image is sampled over.
-    pub domain: Domain,
 }
 
 /// `[pictures]`: pictures of the result, drawn without a display.

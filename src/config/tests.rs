@@ -3,6 +3,21 @@ use super::*;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+mod presets;
+
+/// Keys with a default that presets set: in the commented configuration they have no effect, so that presets have one.
+fn preset_keys() -> BTreeSet<String> {
+    let settings = Preset::ALL.map(Preset::settings);
+    let tables = settings.map(|text| toml::from_str::<toml::Table>(text).expect("TOML"));
+    let has_default = |path: &String| keys::find(path).is_some_and(|key| key.has_default());
+    tables.iter().flat_map(leaves).filter(has_default).collect()
+}
+
+/// Section of a key, empty above all sections, and its name.
+fn section_and_name(path: &str) -> (&str, &str) {
+    path.rsplit_once('.').unwrap_or(("", path))
+}
+
 /// Paths of all leaves of a table, `section.key`.
 fn leaves(table: &toml::Table) -> BTreeSet<String> {
     let mut paths = BTreeSet::new();
@@ -48,7 +63,11 @@ fn key_table_default_and_commented_default_have_the_same_keys() {
         .collect();
     assert_eq!(known, leaves(&default_table()));
     let commented: toml::Table = toml::from_str(COMMENTED_DEFAULT).expect("parses");
-    assert_eq!(known, leaves(&commented));
+    let mut commented = leaves(&commented);
+    let of_presets = preset_keys();
+    assert!(!of_presets.is_empty() && commented.is_disjoint(&of_presets));
+    commented.extend(of_presets);
+    assert_eq!(known, commented);
 }
 
 #[test]
@@ -77,9 +96,9 @@ fn commented_default_describes_every_key() {
         }
         for key in KEYS
             .iter()
-            .filter(|key| key.path.split('.').next() == Some(section))
+            .filter(|key| section_and_name(key.path).0.split('.').next() == Some(section))
         {
-            let (parent, name) = key.path.rsplit_once('.').expect("section.key");
+            let (parent, name) = section_and_name(key.path);
             let description = format!("# {}", key.describe());
             // A key of listed tables has a paragraph of its own that begins with its name and that of the table.
             let table = match parent {
@@ -129,10 +148,18 @@ fn commented_examples_work() {
         else {
             continue;
         };
-        if keys::find(&format!("{section}.{name}")).is_none() {
+        let path = match section {
+            "" => name.to_owned(),
+            _ => format!("{section}.{name}"),
+        };
+        let Some(key) = keys::find(&path) else {
+            continue;
+        };
+        if preset_keys().contains(&path) {
+            assert_eq!(value, key.default, "{path}");
             continue;
         }
-        let config = commented_with(&format!("{section}.{name}"), value).expect(line);
+        let config = commented_with(&path, value).expect(line);
         assert_ne!(
             config.hash(),
             Config::default().hash(),
@@ -152,8 +179,10 @@ fn every_word_is_accepted_and_no_other_exists() {
         for word in words {
             commented_with(key.path, word).expect(key.path);
         }
-        let (section, name) = key.path.split_once('.').expect("section.key");
-        let text = format!("[{section}]\n{name} = \"no such word\"");
+        let text = match section_and_name(key.path) {
+            ("", name) => format!("{name} = \"no such word\""),
+            (section, name) => format!("[{section}]\n{name} = \"no such word\""),
+        };
         let message = toml::from_str::<Config>(&text)
             .expect_err("no such word")
             .message()
@@ -410,6 +439,7 @@ fn hash_depends_on_values_that_change_a_result() {
             Kind::Integer { max, .. } => max.to_string(),
             Kind::Number { max, .. } | Kind::ZeroOr { max, .. } => format!("{max:?}"),
             Kind::Choice(words) => words[words.len() - 1].to_owned(),
+            Kind::Choices(words) => format!("[\"{}\"]", words[0]),
             _ => continue,
         };
         let changed = commented_with(key.path, &value).expect(key.path).hash();

@@ -1,21 +1,24 @@
-//! `images/PPPP.exr`: one geometry image a patch.
+//! `images/PPPP.exr`: one geometry image a patch; `images/packed.exr`: all in one.
 //!
 //! One part, scan lines, ZIP16, `R G B A` as 32-bit floats: the layout that all common readers
-//! take (`X Y Z` names and several parts lose data in some). Further channels are `normal.X/Y/Z`,
-//! `surface.face` (unsigned integers) and `surface.logScale`.
+//! take (`X Y Z` names and several parts lose data in some). Further channels, where they are asked for, are
+//! `normal.X/Y/Z`, `surface.face` (unsigned integers), `surface.logScale`, and of the source `sourceNormal.X/Y/Z`,
+//! `color.R/G/B/A`, `texcoord0.U/V` and `material.id` (unsigned integers). Normals may have 16 bits.
 //!
 //! The encoder keeps custom attributes in a hash map, whose order changes from run to run: so
 //! there is exactly one, the JSON text `affineAtlas`, and the bytes are reproducible.
 
-use crate::atlas::geometry_image::GeometryImage;
+use crate::atlas::geometry_image::{
+    Channel, GeometryImage, ImageParams, Precision, Sampled, Values,
+};
 use crate::atlas::patches::Domain;
-use crate::export::atlas_json::{Document, Similarity, Units};
+use crate::export::atlas_json::{Document, Packed, Similarity, Units};
 use crate::export::{EncodeError, Provenance};
 use ::exr::image::write::WritableImage;
 use ::exr::meta::attribute::{AttributeValue, LineOrder, Text};
 use ::exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, Layer,
-    LayerAttributes,
+    LayerAttributes, f16,
 };
 use serde::{Deserialize, Serialize};
 use std::io::{Seek, Write};
@@ -74,10 +77,59 @@ pub fn label(document: &Document, patch: usize, provenance: &Provenance) -> Labe
 impl Label {
     /// The JSON text in pure ASCII, because the attribute holds bytes of no stated encoding.
     pub fn to_text(&self) -> String {
-        let json = serde_json::to_string(self)
-            .expect("string keys and no custom serialiser, so that serialisation cannot fail");
-        ascii(&json)
+        to_text(self)
     }
+}
+
+/// What the image of all patches says about itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PackedLabel {
+    /// `"affine-atlas"`.
+    pub format: String,
+    /// Version of the output contract.
+    pub version: u32,
+    /// Name of the asset.
+    pub asset: String,
+    /// Component of the asset.
+    pub component: usize,
+    /// Columns and rows, and column and row of the upper left texel of each patch's image.
+    pub packed: Packed,
+    /// Added to `R G B` to give source coordinates.
+    pub image_origin: [f64; 3],
+    /// Units of lengths and angles.
+    pub units: Units,
+    /// BLAKE3 hash of the input, hexadecimal.
+    pub blake3: String,
+    /// BLAKE3 hash of the configuration, hexadecimal.
+    pub config_blake3: String,
+}
+
+/// The label of the image of all patches, if the document has one.
+pub fn packed_label(document: &Document, provenance: &Provenance) -> Option<PackedLabel> {
+    Some(PackedLabel {
+        format: document.format.clone(),
+        version: document.version,
+        asset: provenance.asset.into(),
+        component: provenance.component,
+        packed: document.images.as_ref()?.packed.clone()?,
+        image_origin: document.image_origin,
+        units: document.units.clone(),
+        blake3: provenance.blake3.into(),
+        config_blake3: provenance.config_blake3.into(),
+    })
+}
+
+impl PackedLabel {
+    /// As [`Label::to_text`].
+    pub fn to_text(&self) -> String {
+        to_text(self)
+    }
+}
+
+fn to_text<T: Serialize>(label: &T) -> String {
+    let json = serde_json::to_string(label)
+        .expect("string keys and no custom serialiser, so that serialisation cannot fail");
+    ascii(&json)
 }
 
 /// JSON text with every character beyond ASCII escaped; such characters occur inside strings only.
@@ -96,30 +148,88 @@ fn ascii(json: &str) -> String {
     text
 }
 
-/// Writes an image. Expects its channels to have `width` × `height` values.
+/// Names of a channel's components, where it has several numbers a texel.
+fn component_names(channel: Channel) -> &'static [&'static str] {
+    match channel {
+        Channel::Normal => &["normal.X", "normal.Y", "normal.Z"],
+        Channel::SourceNormal => &["sourceNormal.X", "sourceNormal.Y", "sourceNormal.Z"],
+        Channel::Color => &["color.R", "color.G", "color.B", "color.A"],
+        Channel::Texcoord => &["texcoord0.U", "texcoord0.V"],
+        Channel::LogScale => &["surface.logScale"],
+        Channel::Face | Channel::Material => &[],
+    }
+}
+
+/// The channels of an image with their names.
+fn channels(
+    image: &GeometryImage,
+    params: &ImageParams,
+) -> Result<Vec<(&'static str, FlatSamples)>, EncodeError> {
+    let position = |i: usize| FlatSamples::F32(image.position.iter().map(|p| p[i]).collect());
+    let mut list = vec![
+        ("R", position(0)),
+        ("G", position(1)),
+        ("B", position(2)),
+        ("A", FlatSamples::F32(image.alpha.clone())),
+    ];
+    for &channel in &params.channels {
+        match channel {
+            Channel::Normal => {
+                list.extend(numbers(channel, image.normal.as_flattened(), params));
+            }
+            Channel::LogScale => list.extend(numbers(channel, &image.log_scale, params)),
+            Channel::Face => list.push(("surface.face", FlatSamples::U32(image.face.clone()))),
+            Channel::SourceNormal | Channel::Color | Channel::Texcoord | Channel::Material => {
+                let mut sampled = image.attributes.iter();
+                match sampled.find(|sampled| sampled.channel == channel) {
+                    Some(Sampled {
+                        values: Values::Numbers { values, .. },
+                        ..
+                    }) => list.extend(numbers(channel, values, params)),
+                    Some(Sampled {
+                        values: Values::Ids(ids),
+                        ..
+                    }) => list.push(("material.id", FlatSamples::U32(ids.clone()))),
+                    None => {
+                        let what = format!("the channel {} was not sampled", channel.name());
+                        return Err(EncodeError::Format(what));
+                    }
+                }
+            }
+        }
+    }
+    Ok(list)
+}
+
+/// The components of a channel, whose numbers stand texel by texel.
+fn numbers(
+    channel: Channel,
+    values: &[f32],
+    params: &ImageParams,
+) -> Vec<(&'static str, FlatSamples)> {
+    let names = component_names(channel);
+    let is_half = params.normal_precision == Precision::Half
+        && matches!(channel, Channel::Normal | Channel::SourceNormal);
+    let components = names.iter().enumerate().map(|(i, &name)| {
+        let component = values.iter().skip(i).step_by(names.len()).copied();
+        let samples = match is_half {
+            true => FlatSamples::F16(component.map(f16::from_f32).collect()),
+            false => FlatSamples::F32(component.collect()),
+        };
+        (name, samples)
+    });
+    components.collect()
+}
+
+/// Writes an image with the channels that are asked for and the text of its label. Expects all that it has to have `width` × `height` values.
 pub fn write<W: Write + Seek>(
     image: &GeometryImage,
-    label: &Label,
+    params: &ImageParams,
+    label: &str,
     writer: W,
 ) -> Result<(), EncodeError> {
     check(image)?;
-    let component =
-        |values: &[[f32; 3]], i: usize| FlatSamples::F32(values.iter().map(|v| v[i]).collect());
-    let channels = [
-        ("R", component(&image.position, 0)),
-        ("G", component(&image.position, 1)),
-        ("B", component(&image.position, 2)),
-        ("A", FlatSamples::F32(image.alpha.clone())),
-        ("normal.X", component(&image.normal, 0)),
-        ("normal.Y", component(&image.normal, 1)),
-        ("normal.Z", component(&image.normal, 2)),
-        ("surface.face", FlatSamples::U32(image.face.clone())),
-        (
-            "surface.logScale",
-            FlatSamples::F32(image.log_scale.clone()),
-        ),
-    ];
-    let list = channels
+    let list = channels(image, params)?
         .into_iter()
         .map(|(name, samples)| AnyChannel::new(name, samples))
         .collect();
@@ -129,7 +239,7 @@ pub fn write<W: Write + Seek>(
         line_order: LineOrder::Increasing,
     };
     let mut attributes = LayerAttributes::default();
-    let text = Text::new_or_none(label.to_text())
+    let text = Text::new_or_none(label)
         .ok_or_else(|| EncodeError::Format("the label is not ASCII".into()))?;
     attributes
         .other
@@ -162,6 +272,10 @@ fn check(image: &GeometryImage) -> Result<(), EncodeError> {
         image.face.len(),
         image.log_scale.len(),
     ];
+    let lengths = lengths
+        .into_iter()
+        .chain(image.attributes.iter().map(|a| a.values.texels()));
+    let lengths: Vec<usize> = lengths.collect();
     if texels == 0 || lengths.iter().any(|&n| n != texels) {
         return Err(EncodeError::Format(format!(
             "an image of {} by {} texels with channels of {lengths:?} values",
@@ -176,7 +290,19 @@ fn check(image: &GeometryImage) -> Result<(), EncodeError> {
             && image.alpha[i].is_finite()
             && image.log_scale[i].is_finite()
     };
-    match (0..texels).find(|&i| !finite(i)) {
+    let attributes_finite = |i: usize| {
+        image
+            .attributes
+            .iter()
+            .all(|sampled| match &sampled.values {
+                Values::Numbers { components, values } => {
+                    let texel = &values[i * components..(i + 1) * components];
+                    texel.iter().all(|x| x.is_finite())
+                }
+                Values::Ids(_) => true,
+            })
+    };
+    match (0..texels).find(|&i| !finite(i) || !attributes_finite(i)) {
         Some(i) => Err(EncodeError::NotFinite(format!(
             "texel ({}, {}) of a geometry image",
             i % image.width,
@@ -202,7 +328,8 @@ mod tests {
         let document = atlas_json::describe(&atlas, &provenance).unwrap();
         let label = label(&document, 0, &provenance);
         let mut cursor = Cursor::new(Vec::new());
-        write(&atlas.images[0], &label, &mut cursor).unwrap();
+        let text = label.to_text();
+        write(&atlas.images[0], &atlas.image_params, &text, &mut cursor).unwrap();
         (atlas.images[0].clone(), label, cursor.into_inner())
     }
 
@@ -265,10 +392,22 @@ mod tests {
     fn holes_and_empty_images_are_refused() {
         let (mut image, label, _) = encoded();
         image.position[3][1] = f32::NAN;
-        let error = write(&image, &label, Cursor::new(Vec::new())).unwrap_err();
+        let error = write(
+            &image,
+            &ImageParams::default(),
+            &label.to_text(),
+            Cursor::new(Vec::new()),
+        )
+        .unwrap_err();
         assert!(matches!(error, EncodeError::NotFinite(_)), "{error}");
         (image.width, image.height) = (0, 0);
-        let error = write(&image, &label, Cursor::new(Vec::new())).unwrap_err();
+        let error = write(
+            &image,
+            &ImageParams::default(),
+            &label.to_text(),
+            Cursor::new(Vec::new()),
+        )
+        .unwrap_err();
         assert!(matches!(error, EncodeError::Format(_)), "{error}");
     }
 
@@ -301,13 +440,25 @@ mod tests {
         let (image, label, bytes) = encoded();
         for room in (0..bytes.len() as u64).step_by(bytes.len() / 40) {
             let file = Cursor::new(Vec::new());
-            let error = write(&image, &label, Disk { room, file }).unwrap_err();
+            let error = write(
+                &image,
+                &ImageParams::default(),
+                &label.to_text(),
+                Disk { room, file },
+            )
+            .unwrap_err();
             let EncodeError::Io(source) = error else {
                 panic!("{error}");
             };
             assert_eq!(source.kind(), std::io::ErrorKind::StorageFull);
         }
         let (room, file) = (bytes.len() as u64, Cursor::new(Vec::new()));
-        write(&image, &label, Disk { room, file }).unwrap();
+        write(
+            &image,
+            &ImageParams::default(),
+            &label.to_text(),
+            Disk { room, file },
+        )
+        .unwrap();
     }
 }

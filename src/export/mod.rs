@@ -1,7 +1,7 @@
 //! Writing what a job built: the folder of one asset as the output contract describes it.
 //!
 //! *Enters:* an [`AffineAtlas`] and its [`Provenance`]. *Leaves:* `atlas.json`, `atlas.npz`,
-//! `surface.glb` and `images/PPPP.exr` in a [`folder::Staging`] folder, which replaces the older
+//! `surface.glb`, `images/PPPP.exr` and, where it is asked for, `images/packed.exr` in a [`folder::Staging`] folder, which replaces the older
 //! folder in one step once it is complete.
 //!
 //! *Guaranteed:* the same atlas and provenance give the same bytes, whatever the machine and the
@@ -27,6 +27,7 @@ mod shapes;
 pub use error::{Action, EncodeError, ExportError};
 pub use shapes::check_shapes;
 
+use crate::atlas::geometry_image::pack_images;
 use crate::geometry::mesh::{Appearance, Part};
 use crate::product::AffineAtlas;
 use folder::Staging;
@@ -102,13 +103,27 @@ pub fn write_component(
             let name = inside(&atlas_json::image_path(id));
             let mut file = staging.create(&name)?;
             let label = exr::label(&document, id, provenance);
-            exr::write(image, &label, &mut file).map_err(|e| e.at(file.path()))?;
+            exr::write(image, &atlas.image_params, &label.to_text(), &mut file)
+                .map_err(|e| e.at(file.path()))?;
             file.finish()?;
             Ok(name)
         })
         .collect();
     for name in images {
         files.push(name?);
+    }
+
+    if let (Some(places), Some(label)) = (
+        &atlas.patches.packed,
+        exr::packed_label(&document, provenance),
+    ) {
+        let name = inside(&label.packed.image);
+        let mut file = staging.create(&name)?;
+        let image = pack_images(&atlas.images, places);
+        exr::write(&image, &atlas.image_params, &label.to_text(), &mut file)
+            .map_err(|e| e.at(file.path()))?;
+        file.finish()?;
+        files.push(name);
     }
 
     let name = inside("surface.glb");

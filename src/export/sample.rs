@@ -6,7 +6,7 @@
 use crate::atlas::charts::{Chart, ChartFace, ChartKind, Charts, Gluing, Transition};
 use crate::atlas::cut::{CutGraph, Segment};
 use crate::atlas::develop::Development;
-use crate::atlas::geometry_image::GeometryImage;
+use crate::atlas::geometry_image::{GeometryImage, ImageParams};
 use crate::atlas::patches::{Patch, PatchLayout, Seam, SeamSample};
 use crate::atlas::plane::{RigidMotion, Similarity, distance};
 use crate::export::Provenance;
@@ -267,6 +267,7 @@ impl Grid {
             ),
             patches: self.patches(uv),
             images: vec![self.image(&mesh)],
+            image_params: ImageParams::default(),
             image_origin: [0.0; 3],
             repair: [("welded_vertices".to_owned(), 0)].into(),
             connectivity_repair: ConnectivityRepair::default(),
@@ -464,6 +465,7 @@ impl Grid {
         let (h, size) = self.texels();
         let packed_scale = 1.0 / (h * size[0].max(size[1]) as f64);
         PatchLayout {
+            packed: None,
             face_patch: FaceVec::filled(PatchId::new(0), uv.len()),
             uv,
             patches: vec![Patch {
@@ -506,6 +508,7 @@ impl Grid {
             normal: Vec::new(),
             face: Vec::new(),
             log_scale: Vec::new(),
+            attributes: Vec::new(),
         };
         for (row, column) in (0..height).flat_map(|r| (0..width).map(move |c| (r, c))) {
             let x = matrix[0][0] * (column as f64 + 0.5) + matrix[0][2];

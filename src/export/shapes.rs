@@ -44,6 +44,10 @@ pub fn check_shapes(atlas: &AffineAtlas) -> Result<(), ExportError> {
         ("patch coordinates", atlas.patches.uv.len(), faces),
         ("images", atlas.images.len(), atlas.patches.patches.len()),
     ];
+    if let Some(packed) = &atlas.patches.packed {
+        let images = atlas.images.len();
+        lengths.push(("places of packed images", packed.corners.len(), images));
+    }
     for attribute in &atlas.mesh.attributes {
         lengths.push((
             "attribute values",
@@ -62,6 +66,9 @@ pub fn check_shapes(atlas: &AffineAtlas) -> Result<(), ExportError> {
             ("texel faces", image.face.len(), texels),
             ("texel log scales", image.log_scale.len(), texels),
         ]);
+        for sampled in &image.attributes {
+            lengths.push(("texel attributes", sampled.values.texels(), texels));
+        }
     }
     for (what, found, expected) in lengths {
         if found != expected {
@@ -72,7 +79,19 @@ pub fn check_shapes(atlas: &AffineAtlas) -> Result<(), ExportError> {
             });
         }
     }
+    let packed = atlas.patches.packed.as_ref();
+    let ends = packed.map(|packed| {
+        let boxes = atlas.images.iter().zip(&packed.corners);
+        let ends = boxes.map(|(image, at)| (at[0] + image.width).max(at[1] + image.height));
+        (ends.max(), packed.side)
+    });
+    let (end, side) = ends.unwrap_or_default();
     let bounds = [
+        (
+            "columns and rows of the packed image",
+            end.map(|end| end.saturating_sub(1)),
+            side,
+        ),
         (
             "patches",
             atlas.patches.face_patch.iter().map(|p| p.index()).max(),

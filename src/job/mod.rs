@@ -20,10 +20,11 @@ pub use inspect::{Inspection, inspect};
 use flatten::{Flattened, flatten, refine_for};
 
 use crate::atlas::develop::Development;
+use crate::atlas::geometry_image::SourceSurface;
 use crate::atlas::patches::Domain;
 use crate::atlas::rectangles::Charted;
 use crate::atlas::{charts, develop, geometry_image, patches, rectangles};
-use crate::config::Config;
+use crate::config::{Config, PatchParams};
 use crate::export::folder::{Staging, component_name, list_files};
 use crate::export::{self, ExportError, Provenance, pictures};
 use crate::flow::cones::{self, Requests};
@@ -40,7 +41,8 @@ use std::path::Path;
 use std::time::Instant;
 
 /// Builds the atlas of every component of a mesh in memory. One bad component does not spoil the
-/// others; what concerns the whole mesh is the outer error.
+/// others; what concerns the whole mesh is the outer error. Images are without the channels that the mesh does not have
+/// ([`ImageParams::lacking`](crate::atlas::geometry_image::ImageParams::lacking)).
 pub fn build(
     soup: &Soup,
     config: &Config,
@@ -49,6 +51,10 @@ pub fn build(
     observer.stage("repair", 0, 1);
     let repaired = repair::repair(soup, &config.repair)?;
     let requests = cones::assign(&repaired, &config.cones, &config.boundary)?;
+    let config = &Config {
+        images: config.images.held_by(soup),
+        ..config.clone()
+    };
     let count = repaired.components.len();
     let parts = repaired.components.into_iter().zip(requests).enumerate();
     Ok(parts
@@ -94,6 +100,7 @@ fn build_component(
     let mesh = component.mesh?;
     let prescription = cones::prescribe(&mesh, requests, &config.cones, &config.boundary)?;
     let (given, given_faces) = (mesh.positions.clone(), mesh.connectivity.to_faces());
+    let source = SourceSurface::of(&mesh, &config.images);
     let Flattened {
         mesh,
         metric,
@@ -146,6 +153,10 @@ fn build_component(
     enter("images")?;
     let image_origin = geometry_image::image_origin(&mesh);
     let images = geometry_image::sample(&mesh, &patches, &metric.log_scale, image_origin);
+    let images = match &source {
+        Some(source) => geometry_image::sample_attributes(&mesh, &patches, images, source),
+        None => images,
+    };
     enter("report")?;
     let topology = mesh.connectivity.topology();
     let quality = report::measure(&mesh, &metric, &cut, &central, &charts, &prescription);
@@ -168,6 +179,7 @@ fn build_component(
         charts,
         patches,
         images,
+        image_params: config.images.clone(),
         image_origin,
         connectivity_repair,
         quality,
@@ -209,12 +221,30 @@ fn run_stages(
     let asset = read::read(path, &config.limits)?;
     outcome.input_hash = Some(asset.blake3.clone());
     outcome.notes.clone_from(&asset.notes);
+    for channel in config.images.lacking(&asset.soup) {
+        let note = format!(
+            "{given} has nothing for the channel \"{}\" of images.channels: its images are written without",
+            channel.name()
+        );
+        tracing::warn!(asset = outcome.id, channel = channel.name(), "{note}");
+        outcome.notes.push(note);
+    }
     let atlases = build(&asset.soup, config, observer)?;
     if atlases
         .iter()
         .any(|a| matches!(a, Err(BuildError::Cancelled)))
     {
         return Err(BuildError::Cancelled);
+    }
+    for (index, atlas) in atlases.iter().enumerate() {
+        for note in atlas.iter().flat_map(|atlas| unmet(atlas, &config.patches)) {
+            let note = match atlases.len() {
+                1 => format!("{given} {note}"),
+                _ => format!("component {index} of {given} {note}"),
+            };
+            tracing::warn!(asset = outcome.id, "{note}");
+            outcome.notes.push(note);
+        }
     }
     observer.stage("write", 0, 1);
     let folder = output.join(&outcome.id);
@@ -243,6 +273,26 @@ fn run_stages(
         outcome.components.push(ComponentOutcome { index, result });
     }
     Ok(())
+}
+
+/// What was asked of patches and could not be had, beginning with a verb.
+fn unmet(atlas: &AffineAtlas, params: &PatchParams) -> Vec<String> {
+    let mut notes = Vec::new();
+    let count = atlas.patches.patches.len();
+    if let Some(most) = params.max_count.filter(|&most| count > most) {
+        notes.push(format!(
+            "has {count} patches, more than the {most} of patches.max_count: with fewer, patches would overlap"
+        ));
+    }
+    let side = atlas.patches.packed.as_ref().map(|packed| packed.side);
+    if let (Some(most), Some(side)) = (params.packed_side, side)
+        && side > most
+    {
+        notes.push(format!(
+            "needs a packed image of {side} by {side} texels, more than the {most} of patches.packed_side: each of its {count} patches has at least patches.min_side texels"
+        ));
+    }
+    notes
 }
 
 /// Writes all components into one folder that replaces the older one in one step.

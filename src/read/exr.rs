@@ -6,6 +6,7 @@
 use super::bounded::read_bounded;
 use ::exr::prelude as openexr;
 use ::exr::prelude::{Compression, FlatSamples, MetaData, ReadChannels, ReadLayers};
+use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -22,6 +23,10 @@ pub(crate) struct Image {
     pub normal: Option<[Vec<f32>; 3]>,
     pub face: Option<Vec<u32>>,
     pub log_scale: Option<Vec<f32>>,
+    /// Whether `normal` has 16 bits.
+    pub half_normals: bool,
+    /// All other channels, by name.
+    pub others: BTreeMap<String, FlatSamples>,
     pub text: Option<String>,
 }
 
@@ -43,6 +48,15 @@ pub(crate) fn read(path: &Path, size: [usize; 2]) -> Result<Read, String> {
     // The decoder is not ours: should it panic on hostile bytes, that is an unreadable image.
     let decoded = std::panic::catch_unwind(|| decode(&bytes, size));
     decoded.unwrap_or_else(|_| Err("cannot be decoded".to_owned()))
+}
+
+/// Floats of 16 or 32 bits.
+pub(crate) fn numbers(samples: FlatSamples) -> Option<Vec<f32>> {
+    match samples {
+        FlatSamples::F32(values) => Some(values),
+        FlatSamples::F16(values) => Some(values.into_iter().map(|x| x.to_f32()).collect()),
+        FlatSamples::U32(_) => None,
+    }
 }
 
 /// The image, and what of its layout is not as the contract has it.
@@ -105,27 +119,28 @@ fn decode(bytes: &[u8], [width, height]: [usize; 2]) -> Result<Read, String> {
             openexr::AttributeValue::Text(text) => Some(text.to_string()),
             _ => None,
         });
-    let mut list = decoded.layer_data.channel_data.list;
     let texels = width * height;
-    let mut take = |name: &str| {
-        let at = list
-            .iter()
-            .position(|channel| channel.name.to_string() == name)?;
-        Some(list.swap_remove(at).sample_data).filter(|samples| samples.len() == texels)
-    };
-    let mut floats = |name: &str| match take(name) {
+    let list = decoded.layer_data.channel_data.list.into_iter();
+    let mut others: BTreeMap<String, FlatSamples> = list
+        .filter(|channel| channel.sample_data.len() == texels)
+        .map(|channel| (channel.name.to_string(), channel.sample_data))
+        .collect();
+    let mut floats = |name: &str| match others.remove(name) {
         Some(FlatSamples::F32(values)) => Ok(values),
         Some(_) => Err(format!("channel {name} is not 32-bit float")),
         None => Err(format!("has no channel {name}")),
     };
     let rgb = [floats("R")?, floats("G")?, floats("B")?];
     let alpha = floats("A")?;
-    let normal = match ["X", "Y", "Z"].map(|axis| floats(&format!("normal.{axis}"))) {
-        [Ok(x), Ok(y), Ok(z)] => Some([x, y, z]),
+    let log_scale = floats("surface.logScale").ok();
+    let axes = ["X", "Y", "Z"].map(|axis| format!("normal.{axis}"));
+    let is_half = |name: &String| matches!(others.get(name), Some(FlatSamples::F16(_)));
+    let half_normals = axes.iter().any(is_half);
+    let normal = match axes.map(|name| others.remove(&name).and_then(numbers)) {
+        [Some(x), Some(y), Some(z)] => Some([x, y, z]),
         _ => None,
     };
-    let log_scale = floats("surface.logScale").ok();
-    let face = match take("surface.face") {
+    let face = match others.remove("surface.face") {
         Some(FlatSamples::U32(values)) => Some(values),
         _ => None,
     };
@@ -135,6 +150,8 @@ fn decode(bytes: &[u8], [width, height]: [usize; 2]) -> Result<Read, String> {
         normal,
         face,
         log_scale,
+        half_normals,
+        others,
         text,
     };
     let image = Box::new(image);

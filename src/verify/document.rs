@@ -68,6 +68,8 @@ pub(super) struct Document {
     pub charts: Vec<Chart>,
     pub transitions: Vec<Transition>,
     pub patches: Vec<Patch>,
+    #[serde(default)]
+    pub images: Images,
     pub quality: Quality,
     #[serde(default)]
     pub image_origin: Point3,
@@ -184,6 +186,40 @@ pub(super) struct Patch {
     pub height: usize,
     pub texel_to_patch: [[f64; 3]; 2],
     pub patch_to_chart: Option<Similarity>,
+}
+
+/// What the images hold beside position and mask.
+#[derive(Debug, Deserialize)]
+#[serde(default)]
+pub(super) struct Images {
+    pub channels: Vec<String>,
+    pub normal_precision: String,
+    pub packed: Option<Packed>,
+}
+
+/// One image of all patches.
+#[derive(Debug, Deserialize)]
+pub(super) struct Packed {
+    pub image: String,
+    pub side: usize,
+    pub corners: Vec<[usize; 2]>,
+}
+
+impl Default for Images {
+    /// What they hold where `atlas.json` says nothing.
+    fn default() -> Self {
+        Self {
+            channels: ["normal", "face", "log-scale"].map(str::to_owned).to_vec(),
+            normal_precision: "float".to_owned(),
+            packed: None,
+        }
+    }
+}
+
+impl Images {
+    pub fn is_half(&self) -> bool {
+        self.normal_precision == "half"
+    }
 }
 
 #[derive(Debug, Deserialize)]
@@ -330,6 +366,11 @@ fn stray_ids(document: &Document) -> Vec<String> {
         if patch.domain != "flat" && patch.domain != "rectangle" {
             stray.push(format!("patch {row} of domain {}", patch.domain));
         }
+    }
+    if let Some(packed) = &document.images.packed
+        && !is_inside(&packed.image)
+    {
+        stray.push(format!("image {:?} outside the folder", packed.image));
     }
     stray
 }

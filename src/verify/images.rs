@@ -2,6 +2,7 @@
 
 use super::Verdicts;
 use super::arrays::Arrays;
+use super::channels;
 use super::document::{Document, Patch};
 use super::formulas::{Point2, Point3, Worst, diagonal3, mix3, norm3};
 use super::patches::Groups;
@@ -36,6 +37,7 @@ struct Tally {
     beyond: Worst,
     wrong_face: usize,
     wrong_normal: usize,
+    wrong_source_normal: usize,
     wrong_log_scale: usize,
     sides: Option<Sides>,
 }
@@ -55,15 +57,14 @@ pub(super) fn check(
             let mut tally = Tally::default();
             match read(&folder.join(&patch.image), patch, &mut tally) {
                 Ok(Some(image)) => {
-                    if document.is_generated() {
-                        let lacks = image.normal.is_none()
-                            || image.face.is_none()
-                            || image.log_scale.is_none();
-                        if lacks {
-                            let what = "lacks normal, surface.face or surface.logScale";
-                            tally.layout.get_or_insert(what.to_owned());
-                        }
+                    if document.is_generated()
+                        && let Some(what) = channels::lacking(&image, &document.images)
+                    {
+                        tally.layout.get_or_insert(what);
                     }
+                    tally.infinite += channels::infinite(&image);
+                    tally.wrong_source_normal =
+                        channels::wrong_source_normals(&image, &document.images, patch);
                     tally.text = check_text(image.text.as_deref(), patch, document);
                     if patch.domain == "rectangle" {
                         tally.sides = Some(shared::sides(&image, patch));
@@ -127,6 +128,18 @@ fn report(document: &Document, tallies: &[Tally], verdicts: &mut Verdicts) {
     count("texels hold the surface point", |t| t.wrong, &figure);
     count("texels name their face", |t| t.wrong_face, &of);
     count("texels hold a unit normal", |t| t.wrong_normal, &of);
+    if document
+        .images
+        .channels
+        .iter()
+        .any(|c| c == "source-normal")
+    {
+        count(
+            "texels hold a unit source normal",
+            |t| t.wrong_source_normal,
+            "",
+        );
+    }
     count("texels hold the log scale", |t| t.wrong_log_scale, &of);
     count("dilated texels stay on the patch", |t| t.wild, "");
     let mut beyond = Worst::default();
@@ -384,8 +397,7 @@ impl<'a> Raster<'a> {
             tally.wrong_face += usize::from(face[texel] != f);
         }
         if let Some(normal) = &image.normal {
-            let n: Point3 = std::array::from_fn(|i| f64::from(normal[i][texel]));
-            let unit = (norm3(n) - 1.0).abs() < 1e-3;
+            let unit = channels::is_unit(normal, texel, image.half_normals);
             tally.wrong_normal += usize::from(!unit);
         }
         if let Some(log_scale) = &image.log_scale {

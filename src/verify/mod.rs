@@ -15,6 +15,7 @@
 
 mod arrays;
 mod central;
+mod channels;
 mod charts;
 mod document;
 mod formulas;
@@ -22,6 +23,7 @@ mod glb;
 mod grid;
 mod images;
 mod metric;
+mod packed;
 mod patches;
 mod quality;
 mod seams;
@@ -315,6 +317,7 @@ fn verify_atlas(
         patches::check(&surface, &arrays, &document, options, &slit, &mut verdicts)
     {
         images::check(folder, &arrays, &document, &groups, &mut verdicts);
+        packed::check(folder, &document, &mut verdicts);
         seams::check(&surface, &arrays, &document, &mut verdicts);
     }
     glb::check(folder, &arrays, &document, &mut verdicts);

@@ -2,6 +2,7 @@
 
 mod arrays;
 mod boundaries;
+mod channels;
 mod command;
 mod existence;
 mod fit;
@@ -9,6 +10,7 @@ mod flows;
 mod good;
 #[cfg(unix)]
 mod interrupt;
+mod packed;
 mod prescriptions;
 mod rebuild;
 mod rectangles;

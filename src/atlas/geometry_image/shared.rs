@@ -128,6 +128,7 @@ mod tests {
             patches: vec![rectangle([9, 200], top), rectangle([200, 11], other_top)],
             face_patch,
             uv,
+            packed: None,
         };
         (sample, layout)
     }

@@ -81,8 +81,11 @@ pub(super) fn divide(
         rows.push((faces, division));
     }
     loop {
+        let room = params.max_count.map(|most| most.saturating_sub(rows.len()));
+        let fits = |d: &&Division| room.is_none_or(|room| d.parts.len() <= room + 1);
         let gain = |row: &(Vec<FaceId>, Option<Division>)| {
-            row.1.as_ref().map_or(0.0, |division| division.gain(sum))
+            let division = row.1.as_ref().filter(fits);
+            division.map_or(0.0, |division| division.gain(sum))
         };
         // Rounded: the last digits must not decide.
         let best = (0..rows.len()).max_by_key(|&i| ((gain(&rows[i]) * 1e6) as i64, Reverse(i)));

@@ -85,13 +85,14 @@ pub fn charts_of(
         });
     }
     open_holes(mesh, &mut is_cut);
-    let patches = with_images(&oriented, &sums, params);
+    let (patches, packed) = with_images(&oriented, &sums, params);
     let seams = seams(mesh, &is_cut, &face_patch, &placed);
     Ok(PatchLayout {
         face_patch,
         uv: placed,
         patches,
         seams,
+        packed,
     })
 }
 

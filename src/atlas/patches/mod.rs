@@ -6,8 +6,8 @@
 //! *Guaranteed:* every face is in one patch; a patch is connected across edges that are not cut,
 //! a topological disk, and injective in the plane (up to 1e-10 of its extent); its regional log scale
 //! (½ ln(flat area / source area), averaged over the stars of a face's corners) stays within
-//! [`PatchParams::log_scale_range`]; its image holds it with a margin and covers at least a few texel
-//! centres; patch → chart is a similarity without reflection. The same for any number of threads, and the
+//! [`PatchParams::log_scale_range`], or what [`PatchParams::max_count`] made of it; its image holds it with
+//! a margin and covers at least a few texel centres; patch → chart is a similarity without reflection. The same for any number of threads, and the
 //! same patches under changes of the input's last digits.
 //! *Not guaranteed:* the least number of patches, and the range for the log scale of single faces: a
 //! sliver differs from its surroundings by any amount.
@@ -38,7 +38,7 @@ use crate::atlas::cut::CutGraph;
 use crate::atlas::develop::{Development, Unfolded};
 use crate::atlas::overlay::Layout;
 use crate::atlas::plane::Similarity;
-use crate::geometry::ids::{EdgeVec, FaceVec, PatchId};
+use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, PatchId};
 use crate::geometry::mesh::Mesh;
 use demand::Sums;
 pub use given::charts_of;
@@ -50,6 +50,11 @@ pub(crate) use slit::own_development_error;
 
 /// Most texels on a side of an image.
 pub const MAX_SIDE: usize = 8192;
+
+/// Fewer texels on a side of the packed image hold no patches worth the name.
+const LEAST_PACKED_SIDE: usize = 64;
+/// A range of log scales that bounds nothing: lengths differ by a factor of 5·10²¹.
+const WIDEST_RANGE: f64 = 50.0;
 
 /// The domain of one geometry image.
 #[derive(Clone, Debug, PartialEq)]
@@ -134,6 +139,17 @@ pub struct PatchLayout {
     pub patches: Vec<Patch>,
     /// Their common borders.
     pub seams: Vec<Seam>,
+    /// Where flat images lie in one image of all, if one was asked for.
+    pub packed: Option<PackedPlaces>,
+}
+
+/// The packed square as an image: texel for texel the images of the patches, each in a place of its own.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PackedPlaces {
+    /// Columns and rows. The unit square of packed coordinates is all of it.
+    pub side: usize,
+    /// Column and row, from the top, of the upper left texel of each image.
+    pub corners: Vec<[usize; 2]>,
 }
 
 /// Parameters of patches and packing.
@@ -149,6 +165,10 @@ pub struct PatchParams {
     pub min_side: usize,
     /// Texels between patches in the packed square, and around each image.
     pub padding: usize,
+    /// Most patches: where there are more, `log_scale_range` is doubled until there are not, or it is [`WIDEST_RANGE`].
+    pub max_count: Option<usize>,
+    /// Columns and rows of one image of all flat patches. Patches get fewer texels than the budget has where they would not fit.
+    pub packed_side: Option<usize>,
 }
 
 impl Default for PatchParams {
@@ -158,6 +178,8 @@ impl Default for PatchParams {
             texel_budget: 512 * 512,
             min_side: 16,
             padding: 2,
+            max_count: None,
+            packed_side: None,
         }
     }
 }
@@ -197,6 +219,13 @@ impl PatchParams {
             ("texel_budget", self.texel_budget as f64, 1.0, 1e9),
             ("min_side", self.min_side as f64, 1.0, 4096.0),
             ("padding", self.padding as f64, 0.0, 64.0),
+            ("max_count", self.max_count.unwrap_or(1) as f64, 1.0, 1e9),
+            (
+                "packed_side",
+                self.packed_side.unwrap_or(LEAST_PACKED_SIDE) as f64,
+                LEAST_PACKED_SIDE as f64,
+                MAX_SIDE as f64,
+            ),
         ];
         for (name, value, least, most) in bounds {
             if !(least..=most).contains(&value) {
@@ -243,7 +272,7 @@ pub fn layout(
         }
     }
     let slit = Slit::new(mesh, length, cut, development, under);
-    let sets = segment::segment(&slit, params.log_scale_range);
+    let sets = segment_into(&slit, params);
     let mut own = vec![[0.0; 2]; development.copies];
     let sets = match domain {
         Domain::Flat => divide::divide(&slit, sets, params, &mut own),
@@ -262,37 +291,38 @@ pub fn layout(
         oriented.push(patch);
     }
     let sums = divide::sums(&slit, &sets, params);
-    let patches = with_images(&oriented, &sums, params);
+    let (patches, packed) = with_images(&oriented, &sums, params);
     let seams = seams(mesh, &cut.is_cut, &face_patch, &uv);
     Ok(PatchLayout {
         face_patch,
         uv,
         patches,
         seams,
+        packed,
     })
 }
 
 /// Gives patches their images and their places in the packed square.
-fn with_images(oriented: &[Oriented], sums: &[Sums], params: &PatchParams) -> Vec<Patch> {
-    let rasters = resolution::rasters(oriented, sums, params);
-    // In the packed square every patch has its image's density, on square texels.
-    let sizes: Vec<[usize; 2]> = oriented
-        .iter()
-        .zip(&rasters)
-        .map(|(patch, raster)| {
-            let rows = (raster.density * patch.height - 1e-6).ceil().max(1.0);
-            [raster.width, (rows + 2.0 * raster.margin).round() as usize]
-        })
-        .collect();
+fn with_images(
+    oriented: &[Oriented],
+    sums: &[Sums],
+    params: &PatchParams,
+) -> (Vec<Patch>, Option<PackedPlaces>) {
+    let Placed {
+        rasters,
+        sizes,
+        corners,
+        side,
+    } = place(oriented, sums, params);
     let contents: Vec<[f64; 2]> = oriented
         .iter()
         .zip(&rasters)
         .map(|(patch, raster)| [raster.density, raster.density * patch.height])
         .collect();
-    oriented
+    let patches = oriented
         .iter()
         .zip(&rasters)
-        .zip(packed(&sizes, &contents))
+        .zip(in_square(&sizes, &contents, &corners, side))
         .map(|((patch, raster), (packed_scale, packed_offset))| Patch {
             to_chart: Some(patch.to_chart),
             width: raster.width,
@@ -301,15 +331,117 @@ fn with_images(oriented: &[Oriented], sums: &[Sums], params: &PatchParams) -> Ve
             packed_scale,
             packed_offset,
         })
-        .collect()
+        .collect();
+    let packed = params.packed_side.map(|_| PackedPlaces {
+        side,
+        corners: (rasters.iter().zip(&sizes).zip(&corners))
+            .map(|((raster, size), corner)| {
+                // In the middle of its box, which is higher only where rows are not as far apart as columns.
+                let above = (size[1] - raster.height.min(size[1])) / 2;
+                [corner[0], side - corner[1] - size[1] + above]
+            })
+            .collect(),
+    });
+    (patches, packed)
+}
+
+/// The patches' faces: at most `max_count`, as far as the range of scale decides about that.
+fn segment_into(slit: &Slit, params: &PatchParams) -> Vec<Vec<FaceId>> {
+    let mut range = params.log_scale_range;
+    let mut sets = segment::segment(slit, range);
+    while params.max_count.is_some_and(|most| sets.len() > most) && range < WIDEST_RANGE {
+        range = (2.0 * range).min(WIDEST_RANGE);
+        let fewer = segment::segment(slit, range);
+        if fewer.len() < sets.len() {
+            sets = fewer;
+        }
+    }
+    sets
+}
+
+/// Rasters with their boxes in the packed square, and its side, in texels; corners count from the lower left.
+struct Placed {
+    rasters: Vec<resolution::Raster>,
+    sizes: Vec<[usize; 2]>,
+    corners: Vec<[usize; 2]>,
+    side: usize,
+}
+
+impl Placed {
+    fn with_budget(patches: &[Oriented], sums: &[Sums], params: &PatchParams) -> Self {
+        let rasters = resolution::rasters(patches, sums, params);
+        // In the packed square every patch has its image's density, on square texels.
+        let sizes: Vec<[usize; 2]> = patches
+            .iter()
+            .zip(&rasters)
+            .map(|(patch, raster)| {
+                let rows = (raster.density * patch.height - 1e-6).ceil().max(1.0);
+                let rows = (rows + 2.0 * raster.margin).round() as usize;
+                match params.packed_side {
+                    // The image itself must find room.
+                    Some(_) => [raster.width, rows.max(raster.height)],
+                    None => [raster.width, rows],
+                }
+            })
+            .collect();
+        let fitting = params.packed_side.and_then(|side| {
+            let corners = packing::pack_into(&sizes, side)?;
+            Some((corners, side))
+        });
+        let (corners, side) = fitting.unwrap_or_else(|| packing::pack(&sizes));
+        Self {
+            rasters,
+            sizes,
+            corners,
+            side,
+        }
+    }
+}
+
+/// Gives the patches as many texels as the budget has, or, where a side is asked for, as fit; the least that patches must have may be more.
+fn place(patches: &[Oriented], sums: &[Sums], params: &PatchParams) -> Placed {
+    let with = |texel_budget: usize| {
+        let params = PatchParams {
+            texel_budget,
+            ..params.clone()
+        };
+        Placed::with_budget(patches, sums, &params)
+    };
+    let whole = with(params.texel_budget);
+    let Some(most) = params.packed_side.filter(|&most| whole.side > most) else {
+        return whole;
+    };
+    let (mut low, mut high) = (1, params.texel_budget);
+    let mut best = with(low);
+    // Within a thousandth of the greatest budget that fits.
+    while best.side <= most && high - low > 1 + low / 1024 {
+        let middle = low + (high - low) / 2;
+        let tried = with(middle);
+        if tried.side <= most {
+            (low, best) = (middle, tried);
+        } else {
+            high = middle;
+        }
+    }
+    best
 }
 
 /// Places contents (width, height) in the middle of their boxes, packed into a square: the part of the square that a unit of the
 /// content's width is, and where its lower left corner lies in the unit square.
 pub(crate) fn packed(sizes: &[[usize; 2]], contents: &[[f64; 2]]) -> Vec<(f64, [f64; 2])> {
     let (corners, side) = packing::pack(sizes);
+    in_square(sizes, contents, &corners, side)
+}
+
+/// The same for boxes that have their places.
+fn in_square(
+    sizes: &[[usize; 2]],
+    contents: &[[f64; 2]],
+    corners: &[[usize; 2]],
+    side: usize,
+) -> Vec<(f64, [f64; 2])> {
     let side = side as f64;
-    let boxes = sizes.iter().zip(&corners).zip(contents);
+    let boxes = sizes.iter().zip(corners).zip(contents);
     boxes
         .map(|((size, corner), content)| {
             let place = |i: usize| corner[i] as f64 + 0.5 * (size[i] as f64 - content[i]);

@@ -3,8 +3,7 @@
 /// Lower left corners of rectangles (width, height) that overlap nowhere, and the side of a square that
 /// holds them all. Whole numbers, so the result is the same everywhere.
 pub(super) fn pack(sizes: &[[usize; 2]]) -> (Vec<[usize; 2]>, usize) {
-    let mut order: Vec<usize> = (0..sizes.len()).collect();
-    order.sort_by_key(|&i| (std::cmp::Reverse([sizes[i][1], sizes[i][0]]), i));
+    let order = highest_first(sizes);
     let widest = sizes.iter().map(|s| s[0]).max().unwrap_or(1);
     let area: usize = sizes.iter().map(|s| s[0] * s[1]).sum();
     let root = (area as f64).sqrt();
@@ -15,6 +14,23 @@ pub(super) fn pack(sizes: &[[usize; 2]]) -> (Vec<[usize; 2]>, usize) {
         .map(|width| strip(sizes, &order, width))
         .min_by_key(|(_, side)| *side)
         .unwrap_or_default()
+}
+
+/// Lower left corners in a square of a given side, where they fit into it.
+pub(super) fn pack_into(sizes: &[[usize; 2]], side: usize) -> Option<Vec<[usize; 2]>> {
+    if sizes.iter().flatten().any(|&n| n > side) {
+        return None;
+    }
+    let (corners, found) = strip(sizes, &highest_first(sizes), side);
+    let narrow = (found > side).then(|| pack(sizes));
+    let (corners, found) = narrow.unwrap_or((corners, found));
+    (found <= side).then_some(corners)
+}
+
+fn highest_first(sizes: &[[usize; 2]]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..sizes.len()).collect();
+    order.sort_by_key(|&i| (std::cmp::Reverse([sizes[i][1], sizes[i][0]]), i));
+    order
 }
 
 /// Packs into a strip of the given width; the side is that of the square around what came out.
@@ -87,6 +103,9 @@ mod tests {
             let area: usize = sizes.iter().map(|s| s[0] * s[1]).sum();
             assert!(count < 60 || area as f64 > 0.7 * (side * side) as f64);
         }
+        assert_eq!(pack_into(&[[5, 3], [5, 2]], 5), Some(vec![[0, 0], [0, 3]]));
+        assert_eq!(pack_into(&[[5, 3], [5, 3]], 5), None);
+        assert_eq!(pack_into(&[[6, 1]], 5), None);
         assert_eq!(pack(&[[5, 5]]), (vec![[0, 0]], 5));
         assert_eq!(pack(&[[5, 3]]).1, 5);
     }

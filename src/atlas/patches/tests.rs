@@ -5,7 +5,7 @@ use super::samples::{self, Sample, build, ramp, square, strip};
 use super::*;
 use crate::atlas::geometry_image::{GeometryImage, image_origin, sample};
 use crate::atlas::plane::{distance, doubled_area};
-use crate::geometry::ids::{FaceId, VertexId};
+use crate::geometry::ids::VertexId;
 use crate::geometry::mesh::norm;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;

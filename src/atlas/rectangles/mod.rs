@@ -184,6 +184,7 @@ pub fn rectangles(
         uv,
         patches,
         seams,
+        packed: None,
     };
     Ok((surface, layout))
 }

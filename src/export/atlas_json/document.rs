@@ -1,5 +1,6 @@
 //! The document key by key, in the order in which it is written.
 
+use crate::atlas::geometry_image::{Channel, Precision};
 use crate::atlas::patches::Domain;
 use crate::flow::ricci::{FlowStep, PackingFit, Scheme, Solver};
 use crate::product::{ConnectivityRepair, Quality};
@@ -40,6 +41,9 @@ pub struct Document {
     pub periods: Option<[[f64; 2]; 2]>,
     /// Domains of the geometry images.
     pub patches: Vec<Patch>,
+    /// What the images hold; absent where that is normal, face and log scale, all of 32 bits, and no image of all patches is there.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub images: Option<Images>,
     /// Measured quality.
     pub quality: Quality,
     /// Added to an image's `R G B` to give source coordinates.
@@ -260,6 +264,29 @@ pub struct Patch {
     pub patch_to_chart: Option<Similarity>,
     /// Patch coordinates to the unit square of `surface.glb`, v up.
     pub patch_to_packed: Packing,
+}
+
+/// What the images hold.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Images {
+    /// Groups of channels beside position and mask, as `images.channels` names them; those that the source lacks are not there.
+    pub channels: Vec<Channel>,
+    /// How normals are stored.
+    pub normal_precision: Precision,
+    /// One image of all patches; absent where none was asked for.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub packed: Option<Packed>,
+}
+
+/// One image of all patches: in it, each patch's image lies texel for texel.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Packed {
+    /// The image, relative to the folder.
+    pub image: String,
+    /// Its columns and rows.
+    pub side: usize,
+    /// Column and row, from the top, of the upper left texel of each patch's image, by patch.
+    pub corners: Vec<[usize; 2]>,
 }
 
 /// p ↦ scale · R(rotation) p + translation.

@@ -8,6 +8,7 @@ mod text;
 pub use document::*;
 
 use crate::atlas::charts::ChartKind;
+use crate::atlas::geometry_image::ImageParams;
 use crate::atlas::plane::{RigidMotion, wrap_angle};
 use crate::export::{ExportError, Provenance, periods};
 use crate::flow::cones::BoundaryCondition;
@@ -20,6 +21,9 @@ pub const FORMAT_VERSION: u32 = 1;
 
 /// Largest distance from a multiple of π/2 at which a rotation counts as a quarter turn, radians.
 pub const QUARTER_TURN_TOLERANCE: f64 = 1e-8;
+
+/// Name of the image of all patches inside the component's folder.
+const PACKED_IMAGE: &str = "images/packed.exr";
 
 /// Name of the image of a patch inside the component's folder.
 pub fn image_path(patch: usize) -> String {
@@ -74,6 +78,7 @@ pub fn describe(atlas: &AffineAtlas, provenance: &Provenance) -> Result<Document
         transitions: transitions(atlas),
         periods: periods::period_vectors(atlas),
         patches: patches(atlas),
+        images: images(atlas),
         quality: atlas.quality,
         image_origin: atlas.image_origin,
         flags: Flags {
@@ -126,6 +131,24 @@ fn metric(atlas: &AffineAtlas) -> Metric {
         fit: atlas.metric.fit,
         history: history.clone(),
     }
+}
+
+/// What the images hold, unless it is what they hold by default.
+fn images(atlas: &AffineAtlas) -> Option<Images> {
+    let (own, default) = (&atlas.image_params, ImageParams::default());
+    let packed = atlas.patches.packed.as_ref().map(|places| Packed {
+        image: PACKED_IMAGE.into(),
+        side: places.side,
+        corners: places.corners.clone(),
+    });
+    let differs = packed.is_some()
+        || own.channels != default.channels
+        || own.normal_precision != default.normal_precision;
+    differs.then(|| Images {
+        channels: own.channels.iter().copied().collect(),
+        normal_precision: own.normal_precision,
+        packed,
+    })
 }
 
 fn cones(atlas: &AffineAtlas) -> Vec<Cone> {

@@ -4,6 +4,7 @@ use super::*;
 use crate::atlas::charts::Charts;
 use crate::atlas::cut::{CutGraph, Segment};
 use crate::atlas::develop::Development;
+use crate::atlas::geometry_image::ImageParams;
 use crate::atlas::patches::{Patch, PatchLayout};
 use crate::atlas::plane::{Similarity, distance};
 use crate::flow::cones::{BoundaryCondition, Cone, Prescription};
@@ -153,8 +154,10 @@ fn torus(n: u32, m: u32, k: f64) -> AffineAtlas {
             uv: uv.into(),
             patches: vec![patch(0), patch(1)],
             seams: vec![],
+            packed: None,
         },
         images: vec![],
+        image_params: ImageParams::default(),
         image_origin: [0.0; 3],
         repair: Default::default(),
         connectivity_repair: ConnectivityRepair::default(),
