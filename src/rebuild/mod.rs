@@ -22,6 +22,7 @@
 mod band;
 mod border;
 mod chain;
+mod collinear;
 mod crossing;
 mod error;
 mod frame;

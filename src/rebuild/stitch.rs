@@ -6,6 +6,7 @@
 use super::band::Band;
 use super::border::Borders;
 use super::chain::Chain;
+use super::collinear::Faces;
 use super::frame::Frame;
 use super::{Images, RebuildError, Rebuilt};
 use crate::geometry::connectivity::Connectivity;
@@ -107,6 +108,13 @@ pub(super) fn stitch(
             break;
         }
     }
+    let mut faces = Faces {
+        positions: &mesh.positions,
+        vertex: &mesh.vertex,
+        uv: &mesh.uv,
+        faces: &mut mesh.faces,
+    };
+    faces.give_area();
     mesh.finish()
 }
 

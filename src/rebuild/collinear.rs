@@ -1,0 +1,124 @@
+//! Faces whose corners lie on a line in space turned into faces with area.
+//!
+//! *Enters:* faces of corner points. *Leaves:* the same surface, with the diagonal of the face and its neighbour exchanged where that helps.
+//!
+//! Along a straight crease or border of a flat region seam samples are collinear in space but not in the plane, so a Delaunay face between three of
+//! them is sound in the plane and has no area in space. The face across its longest edge has, and so have the two that the other diagonal makes.
+
+use crate::atlas::plane::doubled_area;
+use crate::geometry::mesh::{distance, triangle_area};
+use rustc_hash::{FxHashMap, FxHashSet};
+
+/// Area over the square of the longest edge below which corners are on a line: what `f32` tells apart.
+const ON_A_LINE: f64 = 1e-7;
+
+/// Faces as they are stitched.
+pub(super) struct Faces<'a> {
+    pub positions: &'a [[f64; 3]],
+    /// Vertex of every corner point.
+    pub vertex: &'a [u32],
+    /// Its patch coordinates.
+    pub uv: &'a [[f64; 2]],
+    /// Corner points of every face.
+    pub faces: &'a mut [[u32; 3]],
+}
+
+impl Faces<'_> {
+    /// Exchanges diagonals; see the module docs. Each face at most once.
+    pub fn give_area(&mut self) {
+        let flat: Vec<usize> = (0..self.faces.len())
+            .filter(|&f| self.is_collinear(self.faces[f]))
+            .collect();
+        if flat.is_empty() {
+            return;
+        }
+        let mut edges: FxHashSet<[u32; 2]> = FxHashSet::default();
+        let mut across: FxHashMap<[u32; 2], usize> = FxHashMap::default();
+        for (f, corners) in self.faces.iter().enumerate() {
+            for k in 0..3 {
+                let [a, b] = [corners[k], corners[(k + 1) % 3]];
+                across.insert([a, b], f);
+                edges.insert(self.edge(a, b));
+            }
+        }
+        let mut changed: FxHashSet<usize> = FxHashSet::default();
+        for f in flat {
+            let corners = self.faces[f];
+            let length =
+                |k: usize| distance(self.place(corners[k]), self.place(corners[(k + 1) % 3]));
+            let longest = (0..3).fold(0, |best, k| if length(k) > length(best) { k } else { best });
+            let [p, q, r] = [0, 1, 2].map(|k| corners[(longest + k) % 3]);
+            let Some(&other) = across.get(&[q, p]) else {
+                continue;
+            };
+            let Some(s) = self.faces[other].into_iter().find(|c| ![p, q].contains(c)) else {
+                continue;
+            };
+            let new = [[p, s, r], [s, q, r]];
+            let is_sound = |t: [u32; 3]| {
+                doubled_area(t.map(|c| self.uv[c as usize])) > 0.0 && !self.is_collinear(t)
+            };
+            let is_new = self.vertex[r as usize] != self.vertex[s as usize]
+                && !edges.contains(&self.edge(r, s));
+            let is_first = !changed.contains(&f) && !changed.contains(&other);
+            if is_first && is_new && new.into_iter().all(is_sound) {
+                edges.remove(&self.edge(p, q));
+                edges.insert(self.edge(r, s));
+                changed.extend([f, other]);
+                [self.faces[f], self.faces[other]] = new;
+            }
+        }
+    }
+
+    fn place(&self, corner: u32) -> [f64; 3] {
+        self.positions[self.vertex[corner as usize] as usize]
+    }
+
+    /// Vertices of an edge, whichever way it is gone.
+    fn edge(&self, a: u32, b: u32) -> [u32; 2] {
+        let [a, b] = [a, b].map(|c| self.vertex[c as usize]);
+        [a.min(b), a.max(b)]
+    }
+
+    fn is_collinear(&self, corners: [u32; 3]) -> bool {
+        let p = corners.map(|c| self.place(c));
+        let longest = (0..3)
+            .map(|k| distance(p[k], p[(k + 1) % 3]))
+            .fold(0.0, f64::max);
+        triangle_area(p) <= ON_A_LINE * longest * longest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A square whose lower side has a point in the middle, bent in the plane, straight in space.
+    #[test]
+    fn a_face_on_a_line_gets_area() {
+        let positions = [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [2.0, 0.0, 0.0],
+            [1.0, 1.0, 0.0],
+        ];
+        let uv = [[0.0, 0.0], [1.0, -0.2], [2.0, 0.0], [1.0, 1.0]];
+        let mut faces = [[0, 1, 2], [2, 3, 0]];
+        let vertex = [0, 1, 2, 3];
+        let mut all = Faces {
+            positions: &positions,
+            vertex: &vertex,
+            uv: &uv,
+            faces: &mut faces,
+        };
+        assert!(all.is_collinear([0, 1, 2]));
+        all.give_area();
+        for t in faces {
+            assert!(
+                triangle_area(t.map(|c| positions[c as usize])) > 0.4,
+                "{faces:?}"
+            );
+            assert!(doubled_area(t.map(|c| uv[c as usize])) > 0.0, "{faces:?}");
+        }
+    }
+}
