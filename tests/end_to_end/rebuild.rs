@@ -58,8 +58,9 @@ fn comes_back(name: &str, genus: i64, loops: usize) {
         );
         let angle = quality["image_normal_error"]["mean"].as_f64();
         assert!(angle.is_some_and(|x| x < 0.3), "{name} {side}: {angle:?}");
+        // 64² texels are few for the animal, margins included.
         assert!(
-            psnr > 45.0 && psnr > last + 5.0 || psnr > 120.0,
+            psnr > 43.0 && psnr > last + 5.0 || psnr > 120.0,
             "{name} {side}: {psnr} after {last}"
         );
         last = psnr;
@@ -253,7 +254,7 @@ fn files_that_are_missing_or_do_not_fit() {
         "{said}"
     );
     let said = refusal(|atlas| edit_json(atlas, |d| d["patches"][0]["width"] = 7.into()));
-    insta::assert_snapshot!(said, @"failed: CUBE (input): CUBE/images/0000.exr has 78 columns and 60 rows, but atlas.json states 7 and 60");
+    insta::assert_snapshot!(said, @"failed: CUBE (input): CUBE/images/0000.exr has 26 columns and 26 rows, but atlas.json states 7 and 26");
     let said = refusal(|atlas| edit_json(atlas, |d| d["patches"][0]["domain"] = "hexagon".into()));
     insta::assert_snapshot!(said, @r#"failed: CUBE (input): patch 0 of CUBE/atlas.json has the domain "hexagon"; it must be "flat" or "rectangle""#);
     let said = refusal(|atlas| edit_json(atlas, |d| d["version"] = 2.into()));
@@ -286,7 +287,7 @@ fn seams_that_do_not_bound_patches() {
     let seams = |edit: fn(&mut Seams)| refusal(|atlas| edit_seams(atlas, edit));
     insta::assert_snapshot!(seams(|s| s.position[4] = f64::NAN), @"failed: CUBE (input): genus-0-cube: sample 1 of seam 0 has the position NaN; it must be finite");
     insta::assert_snapshot!(seams(|s| s.uv[0] = f64::INFINITY), @"failed: CUBE (input): genus-0-cube: sample 0 of seam 0 has the patch coordinate inf; it must be finite");
-    insta::assert_snapshot!(seams(|s| s.uv[0] = 9.0), @"failed: CUBE (input): genus-0-cube: sample 0 of seam 0 lies at column 668.000, row 20.750 of patch 0, whose image has 78 columns and 60 rows");
+    insta::assert_snapshot!(seams(|s| s.uv[0] = 9.0), @"failed: CUBE (input): genus-0-cube: sample 0 of seam 0 lies at column 200.000, row 2.000 of patch 0, whose image has 26 columns and 26 rows");
     insta::assert_snapshot!(seams(|s| s.uv[0] += 1e-3), @"failed: CUBE (input): genus-0-cube: the seams do not close around patch 0: where seam 1 ends, no seam begins (the nearest begins 0.074 texels away)");
     insta::assert_snapshot!(seams(|s| s.patch[0] = 77), @"failed: CUBE (input): genus-0-cube: seam 0 names patch 77, but there are 1");
     insta::assert_snapshot!(seams(|s| s.offset[1] = 1), @"failed: CUBE (input): genus-0-cube: seam 0 has 1 samples; a seam has at least 2");
