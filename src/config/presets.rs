@@ -28,7 +28,7 @@ pub enum Preset {
 pub(super) const WORDS: &[&str] = &["spline-fit", "geometry-image-256", "omage-1024", "texture"];
 
 impl Preset {
-    /// All of them, in the order of [`WORDS`].
+    /// All of them, in the order in which they are listed.
     pub const ALL: [Self; 4] = [
         Self::SplineFit,
         Self::GeometryImage256,

@@ -5,7 +5,7 @@
 //! ([`Steps`]).
 //!
 //! An affine atlas has flat coordinates whose transitions are rotations and translations. Where all rotations are quarter turns, the flat
-//! coordinates are deformed a little so that translations become whole tiles ([`field`]); a pattern that looks the same after a
+//! coordinates are deformed a little so that translations become whole tiles (`field`); a pattern that looks the same after a
 //! quarter turn then has no seams at all, but for what sampling does. Elsewhere flat coordinates are taken as they are, and the pattern
 //! jumps at the cut.
 //!

@@ -165,7 +165,7 @@ pub struct PatchParams {
     pub min_side: usize,
     /// Texels between patches in the packed square, and around each image.
     pub padding: usize,
-    /// Most patches: where there are more, `log_scale_range` is doubled until there are not, or it is [`WIDEST_RANGE`].
+    /// Most patches: where there are more, `log_scale_range` is doubled until there are not, or it is as wide as a configuration may ask for.
     pub max_count: Option<usize>,
     /// Columns and rows of one image of all flat patches. Patches get fewer texels than the budget has where they would not fit.
     pub packed_side: Option<usize>,
