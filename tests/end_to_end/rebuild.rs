@@ -271,7 +271,7 @@ fn files_that_are_missing_or_do_not_fit() {
             d["patches"][0]["texel_to_patch"][1][1] = 0.5.into()
         })
     });
-    insta::assert_snapshot!(said, @"failed: CUBE (input): genus-0-cube: texel_to_patch of patch 0 has determinant 6.756756756756757e-3; it must be negative (row 0 at the top) and finite");
+    insta::assert_snapshot!(said, @"failed: CUBE (input): genus-0-cube: texel_to_patch of patch 0 has determinant 2.2727272727272728e-2; it must be negative (row 0 at the top) and finite");
     let said = refusal(|atlas| {
         let bytes = std::fs::read(atlas.join("atlas.npz")).expect("there");
         std::fs::write(atlas.join("atlas.npz"), &bytes[..bytes.len() / 2]).expect("writable");
@@ -288,11 +288,11 @@ fn seams_that_do_not_bound_patches() {
     insta::assert_snapshot!(seams(|s| s.position[4] = f64::NAN), @"failed: CUBE (input): genus-0-cube: sample 1 of seam 0 has the position NaN; it must be finite");
     insta::assert_snapshot!(seams(|s| s.uv[0] = f64::INFINITY), @"failed: CUBE (input): genus-0-cube: sample 0 of seam 0 has the patch coordinate inf; it must be finite");
     insta::assert_snapshot!(seams(|s| s.uv[0] = 9.0), @"failed: CUBE (input): genus-0-cube: sample 0 of seam 0 lies at column 200.000, row 2.000 of patch 0, whose image has 26 columns and 26 rows");
-    insta::assert_snapshot!(seams(|s| s.uv[0] += 1e-3), @"failed: CUBE (input): genus-0-cube: the seams do not close around patch 0: where seam 1 ends, no seam begins (the nearest begins 0.074 texels away)");
-    insta::assert_snapshot!(seams(|s| s.patch[0] = 77), @"failed: CUBE (input): genus-0-cube: seam 0 names patch 77, but there are 1");
+    insta::assert_snapshot!(seams(|s| s.uv[0] += 1e-3), @"failed: CUBE (input): genus-0-cube: the seams do not close around patch 0: where seam 1 ends, no seam begins (the nearest begins 0.022 texels away)");
+    insta::assert_snapshot!(seams(|s| s.patch[0] = 77), @"failed: CUBE (input): genus-0-cube: seam 0 names patch 77, but there are 6");
     insta::assert_snapshot!(seams(|s| s.offset[1] = 1), @"failed: CUBE (input): genus-0-cube: seam 0 has 1 samples; a seam has at least 2");
-    insta::assert_snapshot!(seams(|s| { s.offset.pop(); }), @"failed: CUBE (input): seam_offset of CUBE/atlas.npz must rise from 0 to the 26 samples and have one entry more than the 5 seams; it has 5 entries and ends with 22");
-    insta::assert_snapshot!(seams(|s| s.uv.truncate(8)), @"failed: CUBE (input): CUBE/atlas.npz: seam_uv: shape [2, 2, 2] is not (26, 2, 2); build the atlas again, or give its complete folder");
+    insta::assert_snapshot!(seams(|s| { s.offset.pop(); }), @"failed: CUBE (input): seam_offset of CUBE/atlas.npz must rise from 0 to the 48 samples and have one entry more than the 12 seams; it has 12 entries and ends with 44");
+    insta::assert_snapshot!(seams(|s| s.uv.truncate(8)), @"failed: CUBE (input): CUBE/atlas.npz: seam_uv: shape [2, 2, 2] is not (48, 2, 2); build the atlas again, or give its complete folder");
     insta::assert_snapshot!(
         seams(|s| {
             s.offset.truncate(1);
@@ -303,7 +303,7 @@ fn seams_that_do_not_bound_patches() {
         @"failed: CUBE (input): genus-0-cube: no seam runs along patch 0; the seams must close around every patch"
     );
     // One seam is no boundary any more.
-    insta::assert_snapshot!(seams(|s| s.patch[1] = u32::MAX), @"failed: CUBE (input): genus-0-cube: the seams do not close around patch 0: where seam 0 ends, no seam begins (the nearest begins 18.500 texels away)");
+    insta::assert_snapshot!(seams(|s| s.patch[1] = u32::MAX), @"failed: CUBE (input): genus-0-cube: the seams do not close around patch 2: where seam 9 ends, no seam begins (the nearest begins 22.000 texels away)");
 }
 
 #[test]
