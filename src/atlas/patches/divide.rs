@@ -9,13 +9,13 @@
 //! Divisions that are tried: along creases, and by straight lines. Parts of what is injective and within the range of scale are so too; each is
 //! kept a disk. *Not guaranteed:* the best of all divisions.
 
-use super::PatchParams;
 use super::demand::{self, Budget, Demand, Sums};
 use super::rectangle::in_rectangle;
 use super::segment::{Placement, Sets, centroid, place, rounded_ln, split_at_holes};
 use super::slit::Slit;
+use super::{Domain, PatchParams};
 use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, FaceVec, HalfedgeId, NONE};
-use crate::geometry::mesh::{cross, norm, sub};
+use crate::geometry::mesh::{Mesh, cross, norm, sub};
 use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 use std::collections::VecDeque;
@@ -54,16 +54,20 @@ struct Divider<'a> {
     /// Scratch space of [`Divider::by_creases`].
     label: FaceVec<u32>,
     is_crease: EdgeVec<bool>,
+    /// Whether lines are tried: rectangles have lines of their own.
+    with_lines: bool,
 }
 
 /// Divides patches; see the module docs. `own` is scratch space, a place a copy.
 pub(super) fn divide(
     slit: &Slit,
     patches: Vec<Vec<FaceId>>,
+    domain: Domain,
     params: &PatchParams,
     own: &mut [[f64; 2]],
 ) -> Vec<Vec<FaceId>> {
     let mut divider = Divider::new(slit, params);
+    divider.with_lines = domain == Domain::Flat;
     let demands: Vec<Demand> = patches
         .iter()
         .map(|faces| {
@@ -121,28 +125,33 @@ impl Division {
 ///
 /// Faces that are parts of one face of the source lie in its plane however narrow they are, so that normals, and the distance a, are those of
 /// source faces.
-fn bends(slit: &Slit) -> (EdgeVec<[f64; 2]>, EdgeVec<bool>) {
-    let c = slit.connectivity;
-    let source = &slit.mesh.source_face;
+pub(crate) fn bends(
+    mesh: &Mesh,
+    area: &FaceVec<f64>,
+    across: impl Fn(HalfedgeId) -> Option<HalfedgeId>,
+) -> (EdgeVec<[f64; 2]>, EdgeVec<bool>) {
+    let c = &mesh.connectivity;
+    let source = &mesh.source_face;
+    let extent = mesh.diagonal().max(f64::MIN_POSITIVE);
     let mut normals: FxHashMap<u32, ([f64; 3], f64)> = FxHashMap::default();
     for f in c.faces() {
-        let p = slit.mesh.face_positions(f);
-        let side = |k: usize| sub(p[k], p[0]).map(|x| x / slit.extent);
+        let p = mesh.face_positions(f);
+        let side = |k: usize| sub(p[k], p[0]).map(|x| x / extent);
         let n = cross(side(1), side(2));
-        let (sum, area) = normals.entry(source[f]).or_default();
+        let (sum, whole) = normals.entry(source[f]).or_default();
         (0..3).for_each(|i| sum[i] += n[i]);
-        *area += slit.source_area[f];
+        *whole += area[f];
     }
     let between = |e: EdgeId| {
         let h = c.edge_halfedge(e);
-        let t = slit.across(h)?;
+        let t = across(h)?;
         let (f, g) = (source[c.face(h)], source[c.face(t)]);
         (f != g).then(|| (f.min(g), f.max(g)))
     };
     let mut lengths: FxHashMap<(u32, u32), f64> = FxHashMap::default();
     for e in c.edges() {
         if let Some(pair) = between(e) {
-            *lengths.entry(pair).or_default() += slit.mesh.edge_length(e);
+            *lengths.entry(pair).or_default() += mesh.edge_length(e);
         }
     }
     let mut bend = EdgeVec::filled([0.0; 2], c.edge_count());
@@ -151,7 +160,7 @@ fn bends(slit: &Slit) -> (EdgeVec<[f64; 2]>, EdgeVec<bool>) {
         let Some(pair) = between(e) else { continue };
         let ((n, of_n), (m, of_m)) = (normals[&pair.0], normals[&pair.1]);
         let cosine = (0..3).map(|i| n[i] * m[i]).sum::<f64>() / (norm(n) * norm(m));
-        let crease = cosine.clamp(-1.0, 1.0).acos().powi(2) * slit.mesh.edge_length(e);
+        let crease = cosine.clamp(-1.0, 1.0).acos().powi(2) * mesh.edge_length(e);
         let apart = (of_n + of_m) / (3.0 * lengths[&pair]);
         if crease.is_finite() && apart > 0.0 && apart.is_finite() {
             bend[e] = [crease, crease / apart];
@@ -169,7 +178,7 @@ pub(super) fn sums(slit: &Slit, patches: &[Vec<FaceId>], params: &PatchParams) -
 
 impl<'a> Divider<'a> {
     fn new(slit: &'a Slit<'a>, params: &PatchParams) -> Self {
-        let (bend, is_crease) = bends(slit);
+        let (bend, is_crease) = bends(slit.mesh, &slit.source_area, |h| slit.across(h));
         let faces = slit.connectivity.faces();
         let faces = faces.map(|f| of_face(slit, &bend, f, |_| true)).collect();
         Self {
@@ -181,6 +190,7 @@ impl<'a> Divider<'a> {
             bend,
             label: FaceVec::filled(NONE, slit.connectivity.face_count()),
             is_crease,
+            with_lines: true,
         }
     }
 
@@ -207,7 +217,9 @@ impl<'a> Divider<'a> {
             let (demand, angle) = divider.demand(faces, placement);
             let now = divider.cost(&demand);
             let mut tried = vec![divider.by_creases(faces)];
-            tried.extend(divider.by_lines(faces, placement, angle));
+            if divider.with_lines {
+                tried.extend(divider.by_lines(faces, placement, angle));
+            }
             let mut found: Vec<(i64, Division)> = Vec::new();
             for sides in tried {
                 let division = divider.in_parts(sides, now, placement);

@@ -41,6 +41,7 @@ use crate::atlas::plane::Similarity;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, PatchId};
 use crate::geometry::mesh::Mesh;
 use demand::Sums;
+pub(crate) use divide::bends;
 pub use given::charts_of;
 use rectangle::Oriented;
 pub(crate) use seams::seams;
@@ -274,11 +275,7 @@ pub fn layout(
     let slit = Slit::new(mesh, length, cut, development, under);
     let sets = segment_into(&slit, params);
     let mut own = vec![[0.0; 2]; development.copies];
-    let sets = match domain {
-        Domain::Flat => divide::divide(&slit, sets, params, &mut own),
-        // Every side of a patch is a rectangle more.
-        Domain::Rectangle => sets,
-    };
+    let sets = divide::divide(&slit, sets, domain, params, &mut own);
     let mut face_patch = FaceVec::filled(PatchId::new(0), c.face_count());
     let mut uv = FaceVec::filled([[0.0; 2]; 3], c.face_count());
     let mut oriented = Vec::with_capacity(sets.len());

@@ -64,7 +64,7 @@ pub(super) fn divide(drawing: &mut Drawing) -> Result<(), RectangleError> {
             let first = places(drawing, &disk, |role| role == Role::Node).next();
             disk.border.rotate_left(first.unwrap_or(0));
             let line = match depth < DEPTH {
-                true => best_line(drawing, &disk)?,
+                true => best_line(drawing, &disk, false)?,
                 false => None,
             };
             if let Some(line) = line {
@@ -80,7 +80,7 @@ pub(super) fn divide(drawing: &mut Drawing) -> Result<(), RectangleError> {
     Ok(())
 }
 
-fn draw_between(
+pub(super) fn draw_between(
     drawing: &mut Drawing,
     disk: &Disk,
     [from, to]: [usize; 2],
@@ -234,8 +234,12 @@ fn wall_between(drawing: &mut Drawing, v: VertexId, w: VertexId) -> Result<EdgeI
     Ok(edge)
 }
 
-/// Between which places a disk is divided best; nothing where it is good as it is.
-fn best_line(drawing: &Drawing, disk: &Disk) -> Result<Option<[usize; 2]>, RectangleError> {
+/// Between which places a disk, which begins at a node, is divided best; nothing where it is good as it is, if it need not be.
+pub(super) fn best_line(
+    drawing: &Drawing,
+    disk: &Disk,
+    is_wanted: bool,
+) -> Result<Option<[usize; 2]>, RectangleError> {
     let length = disk.lengths(&drawing.fine);
     let nodes: Vec<usize> = places(drawing, disk, |role| role == Role::Node).collect();
     let sides = nodes.len();
@@ -251,7 +255,7 @@ fn best_line(drawing: &Drawing, disk: &Disk) -> Result<Option<[usize; 2]>, Recta
             disk.faces.len() >= LEAST_FACES && visibility(drawing, disk, &nodes, &along)? < VISIBLE,
         )
     };
-    if !many && !crowded()? {
+    if !many && !is_wanted && !crowded()? {
         return Ok(None);
     }
     // Where sides are many, every line must leave fewer on both of its sides.
@@ -290,7 +294,7 @@ fn best_line(drawing: &Drawing, disk: &Disk) -> Result<Option<[usize; 2]>, Recta
     let found = best(&roomy, 4);
     let found = match many {
         true => found.or_else(|| best(&anchors, 4)),
-        false => found.filter(|f| f.0 < NARROW),
+        false => found.filter(|f| is_wanted || f.0 < NARROW),
     };
     Ok(found.map(|(_, line)| line))
 }

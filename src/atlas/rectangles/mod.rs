@@ -23,7 +23,9 @@
 //! The tutorial shows rectangles for disks only (Fig. 10 and 18, four corners of π/2); quads by joining centres to middles are
 //! E. Catmull, J. Clark, *Recursively generated B-spline surfaces on arbitrary topological meshes* (1978).
 
+mod bends;
 mod chord;
+mod contract;
 mod counts;
 mod disk;
 mod division;
@@ -33,7 +35,9 @@ mod harmonic;
 mod lift;
 mod place;
 mod quads;
+mod relax;
 mod sides;
+mod sizes;
 mod subdivision;
 mod walls;
 
@@ -43,6 +47,7 @@ mod tests;
 use crate::atlas::charts::Charts;
 use crate::atlas::cut::CutGraph;
 use crate::atlas::develop::Development;
+use crate::atlas::geometry_image::{image_origin, sample};
 use crate::atlas::overlay::OverlayError;
 use crate::atlas::patches::{Patch, PatchLayout, PatchParams, packed, seams};
 use crate::flow::cones::Prescription;
@@ -51,6 +56,8 @@ use crate::flow::solve::SolveError;
 use crate::geometry::connectivity::ConnectivityError;
 use crate::geometry::ids::{FaceVec, PatchId};
 use crate::geometry::mesh::Mesh;
+use bends::Bend;
+use counts::Strips;
 use flow::Rectangle;
 use glue::Added;
 use quads::Quad;
@@ -156,10 +163,15 @@ pub fn rectangles(
     curvature_tolerance: f64,
 ) -> Result<(Charted, PatchLayout), RectangleError> {
     let mut drawing = Drawing::new(&surface.mesh, &surface.cut.is_cut, &flat.face_patch)?;
+    contract::contract(&mut drawing)?;
+    relax::relax(&mut drawing)?;
     division::divide(&mut drawing)?;
+    sizes::divide(&mut drawing, params.texel_budget)?;
+    contract::contract(&mut drawing)?;
+    relax::relax(&mut drawing)?;
     drawing.mark_middles();
     let quads = quads::quads(&mut drawing)?;
-    let samples = counts::samples(&drawing.fine, &quads, params.texel_budget);
+    let strips = Strips::new(&drawing.fine, &quads);
     let (flattened, added) = placed(&drawing.fine, &quads, curvature_tolerance)?;
     let least =
         |value: fn(&Rectangle) -> f64| flattened.iter().map(value).fold(f64::INFINITY, f64::min);
@@ -169,7 +181,6 @@ pub fn rectangles(
         greatest_difference = -least(|r| -r.unequal),
         "patches became rectangles"
     );
-    let patches = patches(&flattened, &samples, params);
     let (fine, face_patch) = glue::glue(&drawing.fine, &flattened, &added)?;
     let surface = lift::lift(surface, &fine);
     let c = &fine.connectivity;
@@ -178,15 +189,36 @@ pub fn rectangles(
         .map(|f| c.face_halfedges(f).map(|h| fine.corner[h].uv))
         .collect();
     let face_patch: FaceVec<PatchId> = face_patch.into();
-    let seams = seams(&surface.mesh, &surface.cut.is_cut, &face_patch, &uv);
-    let layout = PatchLayout {
+    let mut layout = PatchLayout {
         face_patch,
         uv,
-        patches,
-        seams,
+        patches: patches(&flattened, &strips.even(params.texel_budget), params),
+        seams: Vec::new(),
         packed: None,
     };
+    let bends = bends(&surface, &layout, &flattened);
+    let samples = strips.bent(&bends, params.texel_budget);
+    layout.patches = patches(&flattened, &samples, params);
+    layout.seams = seams(
+        &surface.mesh,
+        &surface.cut.is_cut,
+        &layout.face_patch,
+        &layout.uv,
+    );
     Ok((surface, layout))
+}
+
+/// How the surface bends along the sides of every quad, as images of even texels see it.
+fn bends(surface: &Charted, layout: &PatchLayout, rectangles: &[Rectangle]) -> Vec<Bend> {
+    let mesh = &surface.mesh;
+    let images = sample(mesh, layout, &surface.metric.log_scale, image_origin(mesh));
+    let bends = images.iter().map(Bend::of).zip(rectangles);
+    bends
+        .map(|(bend, rectangle)| match rectangle.origin % 2 {
+            0 => bend,
+            _ => bend.turned(),
+        })
+        .collect()
 }
 
 /// Flattens all quads and gives them coordinates, such that both sides of a wall have the same ones along it.

@@ -17,7 +17,7 @@ use super::chord::{Crossing, aim, zero_level};
 use super::disk::Disk;
 use super::division::{cross, draw, joining, part, places, regions};
 use super::sides::{Drawing, Role};
-use crate::geometry::ids::{FaceId, VertexVec};
+use crate::geometry::ids::{FaceId, VertexId, VertexVec};
 
 /// A four-sided part of a patch.
 pub(super) struct Quad {
@@ -31,12 +31,14 @@ pub(super) struct Quad {
 pub(super) fn quads(drawing: &mut Drawing) -> Result<Vec<Quad>, RectangleError> {
     for start in regions(drawing) {
         let disk = part(drawing, start)?;
-        slit_to_centre(drawing, &disk)?;
-        let mut waiting = vec![start];
-        while let Some(start) = waiting.pop() {
-            let disk = part(drawing, start)?;
-            waiting.extend(halve(drawing, disk)?.into_iter().flatten());
+        let nodes: Vec<usize> = places(drawing, &disk, |role| role == Role::Node).collect();
+        let middles: Vec<usize> = places(drawing, &disk, |role| role == Role::Middle).collect();
+        if nodes.len() != middles.len() {
+            return Err(RectangleError::Inconsistent {
+                what: "the sides of a patch",
+            });
         }
+        star(drawing, disk, &middles, &nodes)?;
     }
     // Splits may have moved halfedges of parts that were finished: taken out at the end.
     let quad = |start| {
@@ -52,16 +54,38 @@ pub(super) fn quads(drawing: &mut Drawing) -> Result<Vec<Quad>, RectangleError> 
     regions(drawing).into_iter().map(quad).collect()
 }
 
-/// Finds the centre, and draws the line to it from the first middle.
-fn slit_to_centre(drawing: &mut Drawing, disk: &Disk) -> Result<(), RectangleError> {
+/// Joins places on a disk's border, in its order, to a centre; between any two that follow each other one of `separators` must lie. The centre's vertex.
+pub(super) fn star(
+    drawing: &mut Drawing,
+    disk: Disk,
+    ends: &[usize],
+    separators: &[usize],
+) -> Result<VertexId, RectangleError> {
+    let vertices: Vec<VertexId> = ends.iter().map(|&p| disk.border_vertex(p)).collect();
+    let start = disk.faces.first().copied();
+    let centre = slit_to_centre(drawing, &disk, ends, separators)?;
+    let mut waiting = Vec::from_iter(start);
+    while let Some(start) = waiting.pop() {
+        let disk = part(drawing, start)?;
+        let halves = halve(drawing, disk, centre, &vertices)?;
+        waiting.extend(halves.into_iter().flatten());
+    }
+    Ok(centre)
+}
+
+/// Finds the centre, and draws the line to it from the first of the places that are joined to it.
+fn slit_to_centre(
+    drawing: &mut Drawing,
+    disk: &Disk,
+    middles: &[usize],
+    nodes: &[usize],
+) -> Result<VertexId, RectangleError> {
     let error = || RectangleError::Inconsistent {
         what: "the sides of a patch",
     };
     let n = disk.border.len();
-    let nodes: Vec<usize> = places(drawing, disk, |role| role == Role::Node).collect();
-    let middles: Vec<usize> = places(drawing, disk, |role| role == Role::Middle).collect();
     let sides = middles.len();
-    if sides < 3 || nodes.len() != sides {
+    if sides < 3 {
         return Err(error());
     }
     // 1 between two places, going counterclockwise from the first, 0 elsewhere.
@@ -78,8 +102,8 @@ fn slit_to_centre(drawing: &mut Drawing, disk: &Disk) -> Result<(), RectangleErr
     let opposite = match sides % 2 {
         0 => middles[sides / 2],
         _ => {
-            let node = (0..sides).find(|&i| nodes[i] > middles[sides / 2]);
-            nodes[node.unwrap_or(0)]
+            let node = nodes.iter().find(|&&node| node > middles[sides / 2]);
+            *node.or(nodes.first()).ok_or_else(error)?
         }
     };
     let mut given: Vec<Vec<f64>> = (0..sides)
@@ -123,23 +147,29 @@ fn slit_to_centre(drawing: &mut Drawing, disk: &Disk) -> Result<(), RectangleErr
         }
     };
     drawing.role[centre] = Role::Centre;
-    Ok(())
+    Ok(centre)
 }
 
 /// Divides a part of a patch that has the centre on its border by a line from there; a face of each part, or nothing where
 /// the part is a quad.
-fn halve(drawing: &mut Drawing, disk: Disk) -> Result<Option<[FaceId; 2]>, RectangleError> {
+fn halve(
+    drawing: &mut Drawing,
+    disk: Disk,
+    centre: VertexId,
+    ends: &[VertexId],
+) -> Result<Option<[FaceId; 2]>, RectangleError> {
     let error = || RectangleError::Inconsistent {
         what: "the centre of a patch",
     };
     let n = disk.border.len();
     let mut disk = disk;
-    let centre: Vec<usize> = places(drawing, &disk, |role| role == Role::Centre).collect();
-    let &[centre] = &centre[..] else {
+    let mut at_centre = (0..n).filter(|&place| disk.border_vertex(place) == centre);
+    let (Some(first), None) = (at_centre.next(), at_centre.next()) else {
         return Err(error());
     };
-    disk.border.rotate_left(centre);
-    let middles: Vec<usize> = places(drawing, &disk, |role| role == Role::Middle).collect();
+    disk.border.rotate_left(first);
+    let is_end = |&place: &usize| ends.contains(&disk.border_vertex(place));
+    let middles: Vec<usize> = (0..n).filter(is_end).collect();
     let [first, .., last] = middles[..] else {
         return Err(error());
     };

@@ -8,8 +8,10 @@
 
 use super::RectangleError;
 use super::subdivision::Subdivision;
-use crate::geometry::ids::{EdgeId, EdgeVec, FaceVec, PatchId, VertexId, VertexVec};
+use crate::atlas::patches::bends;
+use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, FaceVec, PatchId, VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
+use crate::geometry::triangle::area;
 
 /// Least sides of a patch: its centre must not lie on a straight line between two middles.
 const LEAST_SIDES: usize = 3;
@@ -17,6 +19,9 @@ const LEAST_SIDES: usize = 3;
 const ON_CLOSED: usize = 4;
 /// A place this near to a vertex (in lengths of its edge) is moved there.
 const SNAP: f64 = 0.1;
+
+/// A side whose faces meet at this angle on the mean is a crease, radians.
+const CREASE: f64 = 0.5;
 
 /// What a vertex is to the quads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,6 +42,10 @@ pub(super) struct Drawing {
     /// Patch of every face of the surface.
     pub face_patch: FaceVec<PatchId>,
     pub is_wall: EdgeVec<bool>,
+    /// Walls that stay where they are: the cut, the surface's border and creases.
+    pub is_fixed: EdgeVec<bool>,
+    /// θ² L of the edges of every face of the surface (half of each), for an area: θ the dihedral angle, L the length.
+    pub bend: FaceVec<f64>,
     pub role: VertexVec<Role>,
 }
 
@@ -65,6 +74,11 @@ impl Drawing {
             fine: Subdivision::identity(mesh),
             face_patch: face_patch.clone(),
             is_wall: c.edges().map(border).collect(),
+            is_fixed: c
+                .edges()
+                .map(|e| is_cut[e] || c.is_boundary_edge(e))
+                .collect(),
+            bend: FaceVec::default(),
             role: VertexVec::filled(Role::Plain, c.vertex_count()),
         };
         let mut valence = VertexVec::filled(0u32, c.vertex_count());
@@ -78,6 +92,7 @@ impl Drawing {
                 drawing.role[v] = Role::Node;
             }
         }
+        drawing.bend = drawing.fix_creases(mesh);
         drawing.open_closed_borders();
         drawing.give_enough_sides()?;
         Ok(drawing)
@@ -96,11 +111,38 @@ impl Drawing {
         let vertex = self.fine.split_edge(e, t);
         // The second half comes first, then what joins the new vertex to the apexes.
         self.is_wall.push(self.is_wall[e]);
+        self.is_fixed.push(self.is_fixed[e]);
         while self.is_wall.len() < self.fine.connectivity.edge_count() {
             self.is_wall.push(false);
+            self.is_fixed.push(false);
         }
         self.role.push(Role::Plain);
         vertex
+    }
+
+    /// Keeps sides along which the surface has a crease, on the whole; what is left of the bend of every face's edges, for an area.
+    fn fix_creases(&mut self, mesh: &Mesh) -> FaceVec<f64> {
+        let c = &mesh.connectivity;
+        let lengths = |f| c.face_edges(f).map(|e| mesh.edge_length(e));
+        let areas = c.faces().map(|f| area(lengths(f)).unwrap_or(0.0));
+        let areas: FaceVec<f64> = areas.collect();
+        let (bend, _) = bends(mesh, &areas, |h| c.twin(h));
+        for side in self.chains() {
+            let length = |&e: &EdgeId| mesh.edge_length(e);
+            let turned = side.edges.iter().map(|e| (bend[*e][0] * length(e)).sqrt());
+            if turned.sum::<f64>() > CREASE * side.edges.iter().map(length).sum::<f64>() {
+                for &e in &side.edges {
+                    self.is_fixed[e] = true;
+                }
+            }
+        }
+        let of_face = |f: FaceId| {
+            let free = c.face_edges(f).into_iter().filter(|&e| !self.is_fixed[e]);
+            let half: f64 = free.map(|e| 0.5 * bend[e][0]).sum();
+            let whole = half / areas[f];
+            if whole.is_finite() { whole } else { 0.0 }
+        };
+        c.faces().map(of_face).collect()
     }
 
     fn open_closed_borders(&mut self) {

@@ -10,9 +10,10 @@
 //! better of the two up to a factor of two.
 
 use super::RectangleError;
-use super::flow::{Rectangle, sides};
+use super::flow::{Piece, Rectangle, sides};
 use super::subdivision::Subdivision;
 use crate::geometry::ids::{HalfedgeVec, NONE, VertexId};
+use crate::geometry::mesh::distance;
 use std::ops::Range;
 
 /// Edges get at least about this part of their side: what conformal maps crowd into less is put beyond the reach of rounding,
@@ -99,8 +100,14 @@ fn join(
 /// The lengths of a side's pieces, in parts of it.
 fn parts(rectangles: &[Rectangle], side: &Side) -> Vec<f64> {
     let pieces = &rectangles[side.rectangle].border[side.pieces.clone()];
-    let whole: f64 = pieces.iter().map(|piece| piece.length).sum();
-    pieces.iter().map(|piece| piece.length / whole).collect()
+    let r = &rectangles[side.rectangle];
+    let length = |piece: &Piece| {
+        let ends = r.fine.connectivity.edge_vertices(piece.edge);
+        let [p, q] = ends.map(|v| r.fine.position[v]);
+        distance(p, q)
+    };
+    let whole: f64 = pieces.iter().map(length).sum();
+    pieces.iter().map(|piece| length(piece) / whole).collect()
 }
 
 /// Where pieces begin. Sums are taken from the nearer end, so that small ones keep their digits there, and the same for both directions.
