@@ -80,21 +80,26 @@ fn pass(drawing: &mut Drawing) -> Result<usize, RectangleError> {
     let mut short: Vec<(&Side, f64)> = sides
         .iter()
         .map(|side| (side, side.length / mean(side)))
-        .filter(|(_, ratio)| *ratio < SHORT)
+        .filter(|(_, ratio)| *ratio < envf("SHORT2", 0.5))
         .collect();
     short.sort_by(|a, b| a.1.total_cmp(&b.1));
     let mut touched = vec![false; count as usize];
     let mut contracted = 0;
-    for (side, _) in short {
+    for (side, ratio) in short {
+        let (least_sides, most_arms) = if ratio < SHORT {
+            (LEAST_SIDES, MOST_ARMS)
+        } else {
+            (LEAST_SIDES + 1, envf("ARMS", 4.0) as usize)
+        };
         let [first, .., last] = side.chain.vertices[..] else {
             continue;
         };
         let mut parts = side.parts.into_iter().flatten();
-        if parts.any(|p| around[p].0 <= LEAST_SIDES) {
+        if parts.any(|p| around[p].0 <= least_sides) {
             continue;
         }
         for [keep, gone] in [[first, last], [last, first]] {
-            let Some(moved) = movable(drawing, &side.chain, keep, gone) else {
+            let Some(moved) = movable(drawing, &side.chain, keep, gone, most_arms) else {
                 continue;
             };
             // Every part at either end changes, and none may change twice in a pass.
@@ -119,7 +124,13 @@ fn pass(drawing: &mut Drawing) -> Result<usize, RectangleError> {
 }
 
 /// The walls that would be drawn to the other end, if all of them may be.
-fn movable(drawing: &Drawing, chain: &Chain, keep: VertexId, gone: VertexId) -> Option<Vec<Arm>> {
+fn movable(
+    drawing: &Drawing,
+    chain: &Chain,
+    keep: VertexId,
+    gone: VertexId,
+    most_arms: usize,
+) -> Option<Vec<Arm>> {
     if keep == gone || drawing.role[keep] != Role::Node || drawing.role[gone] != Role::Node {
         return None;
     }
@@ -141,7 +152,7 @@ fn movable(drawing: &Drawing, chain: &Chain, keep: VertexId, gone: VertexId) -> 
         && passes
         && !loops
         && !free.is_empty()
-        && kept + free.len() <= MOST_ARMS + usize::from(is_free))
+        && kept + free.len() <= most_arms + usize::from(is_free))
     .then_some(free)
 }
 
@@ -199,4 +210,11 @@ fn slide(
     }
     drawing.role[gone] = Role::Plain;
     Ok(true)
+}
+
+pub(super) fn envf(n: &str, d: f64) -> f64 {
+    std::env::var(n)
+        .ok()
+        .and_then(|x| x.parse().ok())
+        .unwrap_or(d)
 }

@@ -101,6 +101,8 @@ impl Strips {
         });
         let typical = losses.fold(f64::MIN_POSITIVE, f64::max).ln();
         let (mut low, mut high) = (typical - 60.0, typical + 60.0);
+        // Where the least numbers are too many already, they are what is left.
+        let mut best = least.clone();
         for _ in 0..HALVINGS {
             let price = 0.5 * (low + high);
             self.settle(bends, price.exp(), &least, &mut intervals);
@@ -108,10 +110,54 @@ impl Strips {
                 low = price;
             } else {
                 high = price;
+                best.clone_from(&intervals);
             }
         }
-        self.settle(bends, high.exp(), &least, &mut intervals);
-        self.samples(&intervals)
+        self.fill(bends, budget, &mut best);
+        self.samples(&best)
+    }
+
+    /// Spends what is left of the budget, since long strips round to much less: one sample more where a texel lowers the error most, as long as there is room.
+    fn fill(&self, bends: &[Bend], budget: usize, intervals: &mut [f64]) {
+        for k in intervals.iter_mut() {
+            *k = (count(*k) - 1) as f64;
+        }
+        let all: Vec<usize> = (0..self.of_quad.len()).collect();
+        let mut crossed: Vec<Vec<usize>> = vec![Vec::new(); self.length.len()];
+        for (quad, strips) in self.of_quad.iter().enumerate() {
+            crossed[strips[0]].push(quad);
+            if strips[1] != strips[0] {
+                crossed[strips[1]].push(quad);
+            }
+        }
+        let sums = |quads: &[usize], intervals: &[f64]| {
+            quads.iter().fold((0.0, 0.0), |(error, texels), &quad| {
+                let [m, n] = self.of_quad[quad].map(|s| intervals[s]);
+                let more = (m + 1.0) * (n + 1.0);
+                (error + bends[quad].error([m, n]), texels + more)
+            })
+        };
+        let mut left = budget as f64 - sums(&all, intervals).1;
+        loop {
+            let mut best: Option<(f64, usize, f64)> = None;
+            for (s, quads) in crossed.iter().enumerate() {
+                if intervals[s] + 1.0 >= MAX_SIDE as f64 {
+                    continue;
+                }
+                let before = sums(quads, intervals);
+                intervals[s] += 1.0;
+                let after = sums(quads, intervals);
+                intervals[s] -= 1.0;
+                let cost = after.1 - before.1;
+                let gain = (before.0 - after.0) / cost;
+                if cost <= left && gain > 0.0 && best.is_none_or(|(most, ..)| gain > most) {
+                    best = Some((gain, s, cost));
+                }
+            }
+            let Some((_, s, cost)) = best else { break };
+            intervals[s] += 1.0;
+            left -= cost;
+        }
     }
 
     fn even_intervals(&self, budget: usize) -> Vec<f64> {

@@ -46,17 +46,22 @@ pub(super) fn divide(drawing: &mut Drawing, budget: usize) -> Result<(), Rectang
         let error: f64 = sizes.iter().map(|s| s.error).sum();
         let before = total(error, quads, budget);
         let gain = |s: &Size| {
-            let after = total(error - s.error + s.divided, quads + ADDED, budget);
+            let after = total(
+                error - s.error + s.divided,
+                quads + super::contract::envf("ADDED", ADDED),
+                budget,
+            );
             // Rounded: the last digits must not decide.
             let gain = (10.0 * (before / after).log10() * 1e6).round() / 1e6;
             if gain.is_finite() { gain } else { 0.0 }
         };
         let best = sizes.iter().map(gain).fold(0.0, f64::max);
         let mut drawn = 0;
-        for size in sizes
-            .iter()
-            .filter(|s| gain(s) >= (SHARE * best).max(LEAST_GAIN))
-        {
+        for size in sizes.iter().filter(|s| {
+            gain(s)
+                >= (super::contract::envf("SHARE", SHARE) * best)
+                    .max(super::contract::envf("GAIN", LEAST_GAIN))
+        }) {
             let mut disk = part(drawing, size.start)?;
             let first = places(drawing, &disk, |role| role == Role::Node).next();
             disk.border.rotate_left(first.unwrap_or(0));
