@@ -42,11 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for path in &meshes {
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
         let asset = read::read(path, &Default::default())?;
-        for domain in if std::env::var("RECT").is_ok() {
-            vec![Domain::Rectangle]
-        } else {
-            vec![Domain::Flat, Domain::Rectangle]
-        } {
+        for domain in [Domain::Flat, Domain::Rectangle] {
             let label = match domain {
                 Domain::Flat => "ours, flat",
                 Domain::Rectangle => "ours, rectangle",

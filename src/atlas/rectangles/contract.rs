@@ -15,6 +15,9 @@ use crate::geometry::ids::{EdgeId, FaceId, FaceVec, NONE, VertexId};
 
 /// Sides shorter than this part of the mean one of both patches are contracted.
 const SHORT: f64 = 0.4;
+/// Those shorter than this part too, where four walls at most meet then and both patches keep four sides: these have the squarest quads.
+const SOMEWHAT_SHORT: f64 = 0.5;
+const FEW_ARMS: usize = 4;
 /// Passes over all sides: in one of them a patch changes once.
 const PASSES: usize = 12;
 /// Least sides that a patch keeps.
@@ -80,7 +83,7 @@ fn pass(drawing: &mut Drawing) -> Result<usize, RectangleError> {
     let mut short: Vec<(&Side, f64)> = sides
         .iter()
         .map(|side| (side, side.length / mean(side)))
-        .filter(|(_, ratio)| *ratio < envf("SHORT2", 0.5))
+        .filter(|(_, ratio)| *ratio < SOMEWHAT_SHORT)
         .collect();
     short.sort_by(|a, b| a.1.total_cmp(&b.1));
     let mut touched = vec![false; count as usize];
@@ -89,11 +92,15 @@ fn pass(drawing: &mut Drawing) -> Result<usize, RectangleError> {
         let (least_sides, most_arms) = if ratio < SHORT {
             (LEAST_SIDES, MOST_ARMS)
         } else {
-            (LEAST_SIDES + 1, envf("ARMS", 4.0) as usize)
+            (LEAST_SIDES + 1, FEW_ARMS)
         };
         let [first, .., last] = side.chain.vertices[..] else {
             continue;
         };
+        // A part on both sides of it would lose two sides.
+        if side.parts[0] == side.parts[1] {
+            continue;
+        }
         let mut parts = side.parts.into_iter().flatten();
         if parts.any(|p| around[p].0 <= least_sides) {
             continue;
@@ -104,15 +111,15 @@ fn pass(drawing: &mut Drawing) -> Result<usize, RectangleError> {
             };
             // Every part at either end changes, and none may change twice in a pass.
             let c = &drawing.fine.connectivity;
-            let near: Vec<usize> = [keep, gone]
+            // Faces that this pass made have no label: they belong to parts that changed.
+            let near: Option<Vec<usize>> = [keep, gone]
                 .into_iter()
                 .flat_map(|v| c.outgoing(v))
-                .filter_map(|h| label.as_slice().get(c.face(h).index()))
-                .map(|&l| l as usize)
+                .map(|h| Some(*label.as_slice().get(c.face(h).index())? as usize))
                 .collect();
-            if near.iter().any(|&p| p >= touched.len() || touched[p]) {
+            let Some(near) = near.filter(|near| near.iter().all(|&p| !touched[p])) else {
                 continue;
-            }
+            };
             if slide(drawing, &side.chain, keep, gone, &moved)? {
                 near.into_iter().for_each(|p| touched[p] = true);
                 contracted += 1;
@@ -210,11 +217,4 @@ fn slide(
     }
     drawing.role[gone] = Role::Plain;
     Ok(true)
-}
-
-pub(super) fn envf(n: &str, d: f64) -> f64 {
-    std::env::var(n)
-        .ok()
-        .and_then(|x| x.parse().ok())
-        .unwrap_or(d)
 }

@@ -26,7 +26,16 @@ pub(super) fn harmonic(
     border: &[HalfedgeId],
     border_values: &[Vec<f64>],
 ) -> Result<Vec<VertexVec<f64>>, RectangleError> {
-    let weight = weights(c, length);
+    with_weights(c, &weights(c, length), border, border_values)
+}
+
+/// The same with given weights, which must be positive.
+pub(super) fn with_weights(
+    c: &Connectivity,
+    weight: &EdgeVec<f64>,
+    border: &[HalfedgeId],
+    border_values: &[Vec<f64>],
+) -> Result<Vec<VertexVec<f64>>, RectangleError> {
     let mut unknown = VertexVec::filled(u32::MAX, c.vertex_count());
     let mut unknowns = 0;
     for v in c.vertices().filter(|&v| !c.is_boundary_vertex(v)) {
@@ -75,7 +84,7 @@ pub(super) fn harmonic(
 }
 
 /// Positive weights: cotangents, raised where they are too small.
-fn weights(c: &Connectivity, length: &EdgeVec<f64>) -> EdgeVec<f64> {
+pub(super) fn weights(c: &Connectivity, length: &EdgeVec<f64>) -> EdgeVec<f64> {
     let mut weight = EdgeVec::filled(0.0, c.edge_count());
     for f in c.faces() {
         let edges = c.face_edges(f);

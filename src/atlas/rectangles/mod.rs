@@ -171,6 +171,9 @@ pub fn rectangles(
         contract::contract(&mut drawing)?;
         relax::relax(&mut drawing)?;
     }
+    if std::env::var("LASTDIV").is_ok() {
+        division::divide(&mut drawing)?;
+    }
     drawing.mark_middles();
     let quads = quads::quads(&mut drawing)?;
     let strips = Strips::new(&drawing.fine, &quads);

@@ -13,10 +13,14 @@
 
 use super::RectangleError;
 use super::flow::Rectangle;
-use super::harmonic::harmonic;
+use super::harmonic::{weights, with_weights};
 use super::walls::Fractions;
 use crate::atlas::plane::{distance, doubled_area};
-use crate::geometry::ids::{HalfedgeId, VertexVec};
+use crate::geometry::ids::{HalfedgeId, VertexId, VertexVec};
+use crate::geometry::mesh::{cross, norm, sub};
+
+/// Stretches that differ by more from the mean say nothing.
+const MOST_STRETCHED: f64 = 8.0;
 
 /// What rounding moves a corner by, at most, in widths of the rectangle.
 const ROUNDING: f64 = 1e-15;
@@ -48,16 +52,34 @@ pub(super) fn place(
         .map(|&h| at[flat.tail(h)].ok_or_else(error))
         .collect::<Result<_, _>>()?;
     let given = [0, 1].map(|i| given.iter().map(|p| p[i]).collect::<Vec<f64>>());
-    let solved = harmonic(flat, &rectangle.layout.length, border, &given)?;
-    let most = [1.0, rectangle.height];
-    let carried = |h: HalfedgeId| {
-        let v = flat.tail(h);
-        // The maximum principle, whatever the rounding.
-        std::array::from_fn(|i| solved[i][v].clamp(0.0, most[i]))
-    };
-    for (v, &carrier) in rectangle.carrier.enumerate() {
-        at[v].get_or_insert_with(|| carrier.place(flat, carried));
+    let mut weight = weights(flat, &rectangle.layout.length);
+    let mut best: Option<(f64, VertexVec<Option<[f64; 2]>>)> = None;
+    for _ in 0..=spread_rounds() {
+        let solved = with_weights(flat, &weight, border, &given)?;
+        let mut at = at.clone();
+        let most = [1.0, rectangle.height];
+        let carried = |h: HalfedgeId| {
+            let v = flat.tail(h);
+            // The maximum principle, whatever the rounding.
+            std::array::from_fn(|i| solved[i][v].clamp(0.0, most[i]))
+        };
+        for (v, &carrier) in rectangle.carrier.enumerate() {
+            at[v].get_or_insert_with(|| carrier.place(flat, carried));
+        }
+        let stretch = Stretch::new(rectangle, &at);
+        if best
+            .as_ref()
+            .is_some_and(|(least, _)| stretch.whole >= *least)
+        {
+            break;
+        }
+        for e in flat.edges() {
+            let [a, b] = flat.edge_vertices(e).map(|v| stretch.at[v]);
+            weight[e] /= (a * b).sqrt();
+        }
+        best = Some((stretch.whole, at));
     }
+    let at = best.ok_or_else(error)?.1;
     let mut folded = 0;
     for f in c.faces() {
         let mut uv = [[0.0; 2]; 3];
@@ -77,6 +99,77 @@ pub(super) fn place(
             faces: c.face_count(),
         }),
     }
+}
+
+/// How much larger than its place in the unit square a rectangle's surface is: the mean squared length of what is a unit long there.
+struct Stretch {
+    /// At the vertices of the flat triangulation; 1 on the mean.
+    at: VertexVec<f64>,
+    /// ∫ over the surface; infinite where a face has no place.
+    whole: f64,
+}
+
+impl Stretch {
+    fn new(rectangle: &Rectangle, at: &VertexVec<Option<[f64; 2]>>) -> Self {
+        let c = &rectangle.fine.connectivity;
+        let count = rectangle.layout.connectivity.vertex_count();
+        let mut sums = VertexVec::filled([0.0; 2], count);
+        let mut all = [0.0; 2];
+        for f in c.faces() {
+            let corners = c.face_vertices(f);
+            let p = corners.map(|v| rectangle.fine.position[v]);
+            let area = 0.5 * norm(cross(sub(p[1], p[0]), sub(p[2], p[0])));
+            let uv = corners.map(|v| at[v].unwrap_or_default());
+            let uv = uv.map(|[u, v]| [u, v / rectangle.height]);
+            let squared = squared_stretch(p, uv);
+            if !(area > 0.0 && squared.is_finite()) {
+                continue;
+            }
+            for sum in corners
+                .iter()
+                .filter(|v| v.index() < count)
+                .map(|v| v.index())
+                .collect::<Vec<_>>()
+            {
+                let sum = &mut sums[VertexId::new(sum)];
+                *sum = [sum[0] + area * squared, sum[1] + area];
+            }
+            all = [all[0] + area * squared, all[1] + area];
+        }
+        let mean = (all[0] / all[1]).sqrt();
+        let at = sums.iter().map(|&[sum, area]| {
+            let stretch = (sum / area).sqrt() / mean;
+            match stretch.is_finite() {
+                true => stretch.clamp(1.0 / MOST_STRETCHED, MOST_STRETCHED),
+                false => 1.0,
+            }
+        });
+        Self {
+            at: at.collect(),
+            whole: all[0],
+        }
+    }
+}
+
+/// Half the squared Frobenius norm of the map from the plane to space that is linear on a triangle.
+fn squared_stretch(p: [[f64; 3]; 3], uv: [[f64; 2]; 3]) -> f64 {
+    let determinant = doubled_area(uv);
+    let along = |i: usize| -> [f64; 3] {
+        // The derivative by coordinate i: corners weighted by the differences of the other coordinate.
+        let other = 1 - i;
+        let sign = if i == 0 { 1.0 } else { -1.0 };
+        std::array::from_fn(|x| {
+            let sum: f64 = (0..3)
+                .map(|k| p[k][x] * (uv[(k + 1) % 3][other] - uv[(k + 2) % 3][other]))
+                .sum();
+            sign * sum / determinant
+        })
+    };
+    0.5 * (norm(along(0)).powi(2) + norm(along(1)).powi(2))
+}
+
+fn spread_rounds() -> usize {
+    super::contract::envf("SPREAD", 4.0) as usize
 }
 
 /// Whether a face is turned over by more than the rounding of its corners, which lie in the unit square.

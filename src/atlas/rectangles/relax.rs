@@ -20,7 +20,7 @@ const ROUNDS: usize = 1;
 
 /// Draws anew what may move.
 pub(super) fn relax(drawing: &mut Drawing) -> Result<(), RectangleError> {
-    for _ in 0..super::contract::envf("ROUNDS", ROUNDS as f64) as usize {
+    for _ in 0..ROUNDS {
         let nodes = drawing.role.enumerate();
         let nodes: Vec<VertexId> = nodes
             .filter(|(_, role)| **role == Role::Node)

@@ -4,7 +4,7 @@
 //!
 //! Strips of rectangles wander over the whole surface, so nearly all rectangles have as many samples: how densely a place is sampled is decided by how large the
 //! rectangles there are. A patch of n sides becomes n of them; with area A its texels are √(A / n) long, in some unit, and its squared error is about b (A / n)^{3/2}, where b is the bend of
-//! its edges (θ² L, as in `patches::demand`). Each division makes about six rectangles more, with fewer texels for all others. It is made where the sum of errors falls by it.
+//! its edges (θ² L, as in `patches::demand`). Each division makes some rectangles more, with fewer texels for all others. It is made where the sum of errors falls by it.
 
 use super::RectangleError;
 use super::division::{best_line, draw_between, part, places, regions};
@@ -17,8 +17,8 @@ const LEAST_GAIN: f64 = 0.03;
 /// Divisions in one round are those that gain at least this part of what the best one gains: the others are judged again.
 const SHARE: f64 = 0.5;
 const ROUNDS: usize = 24;
-/// Quads that a division adds: its line and two sides of neighbours, each counted on both sides.
-const ADDED: f64 = 6.0;
+/// Quads that a division adds: six, for its line and two sides of neighbours are each counted on both sides, less what becomes of short sides.
+const ADDED: f64 = 4.0;
 /// Where nothing bends, texels are at most about twice as long as the mean: errors are equal where they follow the bend to the power of −1/5.
 const FLOOR: f64 = 1.0 / 32.0;
 /// Parts with fewer faces have no room for lines.
@@ -46,22 +46,17 @@ pub(super) fn divide(drawing: &mut Drawing, budget: usize) -> Result<(), Rectang
         let error: f64 = sizes.iter().map(|s| s.error).sum();
         let before = total(error, quads, budget);
         let gain = |s: &Size| {
-            let after = total(
-                error - s.error + s.divided,
-                quads + super::contract::envf("ADDED", ADDED),
-                budget,
-            );
+            let after = total(error - s.error + s.divided, quads + ADDED, budget);
             // Rounded: the last digits must not decide.
             let gain = (10.0 * (before / after).log10() * 1e6).round() / 1e6;
             if gain.is_finite() { gain } else { 0.0 }
         };
         let best = sizes.iter().map(gain).fold(0.0, f64::max);
         let mut drawn = 0;
-        for size in sizes.iter().filter(|s| {
-            gain(s)
-                >= (super::contract::envf("SHARE", SHARE) * best)
-                    .max(super::contract::envf("GAIN", LEAST_GAIN))
-        }) {
+        for size in sizes
+            .iter()
+            .filter(|s| gain(s) >= (SHARE * best).max(LEAST_GAIN))
+        {
             let mut disk = part(drawing, size.start)?;
             let first = places(drawing, &disk, |role| role == Role::Node).next();
             disk.border.rotate_left(first.unwrap_or(0));
