@@ -15,6 +15,7 @@
 //! The tutorial has no patches: it shows one chart that overlaps itself (Fig. 19d). A geometry image needs
 //! a domain that does not.
 
+mod bend;
 mod demand;
 mod dissolve;
 mod divide;
@@ -41,6 +42,7 @@ use crate::atlas::plane::Similarity;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, PatchId};
 use crate::geometry::mesh::Mesh;
 use demand::Sums;
+use divide::Divider;
 pub use given::charts_of;
 use rectangle::Oriented;
 pub(crate) use seams::seams;
@@ -274,23 +276,27 @@ pub fn layout(
     let slit = Slit::new(mesh, length, cut, development, under);
     let sets = segment_into(&slit, params);
     let mut own = vec![[0.0; 2]; development.copies];
+    let mut divider = Divider::new(&slit, params);
     let sets = match domain {
-        Domain::Flat => divide::divide(&slit, sets, params, &mut own),
+        Domain::Flat => divider.divide(sets, params, &mut own),
         // Every side of a patch is a rectangle more.
         Domain::Rectangle => sets,
     };
     let mut face_patch = FaceVec::filled(PatchId::new(0), c.face_count());
     let mut uv = FaceVec::filled([[0.0; 2]; 3], c.face_count());
+    for (i, faces) in sets.iter().enumerate() {
+        faces.iter().for_each(|&f| face_patch[f] = PatchId::new(i));
+    }
     let mut oriented = Vec::with_capacity(sets.len());
     for (i, faces) in sets.iter().enumerate() {
-        let patch = rectangle::orient(&slit, faces, &mut own);
+        let member = |f: FaceId| face_patch[f].index() == i;
+        let patch = rectangle::orient(&slit, faces, member, &mut own);
         for (&f, &corners) in faces.iter().zip(&patch.uv) {
-            face_patch[f] = PatchId::new(i);
             uv[f] = corners;
         }
         oriented.push(patch);
     }
-    let sums = divide::sums(&slit, &sets, params);
+    let sums: Vec<Sums> = sets.iter().map(|faces| divider.sums(faces)).collect();
     let (patches, packed) = with_images(&oriented, &sums, params);
     let seams = seams(mesh, &cut.is_cut, &face_patch, &uv);
     Ok(PatchLayout {

@@ -29,9 +29,9 @@ const GROWTH: f64 = 0.9;
 /// not do: a patch may be a thousandth of it, and what touches there overlaps in the patch.
 pub(super) const TOUCHING: f64 = 1e-10;
 
-/// Faces that overlap by no more than this part of the tolerance are clear of each other: parts of what was grown of such faces
-/// need no second look at their own, smaller extent unless it is smaller by as much.
-const CLEAR: f64 = 1e-2;
+/// Faces that overlap by no more than this part of the tolerance are clear of each other: parts of what they make need no second
+/// look at their own, smaller extent unless it is smaller by as much.
+pub(super) const CLEAR: f64 = 1e-2;
 
 /// Rounds of merging and dividing: each can make the other possible again, hardly ever often.
 const ROUNDS: usize = 3;
@@ -76,10 +76,15 @@ impl<'a> Placement<'a> {
 
     /// True where no two of these faces overlap.
     pub fn is_injective(&self, slit: &Slit, faces: &[FaceId]) -> bool {
+        self.is_injective_by(slit, faces, self.tolerance())
+    }
+
+    /// The same with a tolerance of its own.
+    pub fn is_injective_by(&self, slit: &Slit, faces: &[FaceId], tolerance: f64) -> bool {
         let mut index = self.index(slit, faces);
         faces.iter().all(|&f| {
             let triangle = self.triangle(slit, f);
-            let free = !index.overlaps(&triangle);
+            let free = !index.overlaps_by(&triangle, tolerance);
             index.insert(triangle);
             free
         })
