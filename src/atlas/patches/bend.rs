@@ -53,7 +53,8 @@ impl Bends {
         };
         for group in edges.chunk_by(|a, b| a.0 == b.0) {
             let lengths = group.iter().map(|&(_, e)| slit.mesh.edge_length(e));
-            let length: f64 = lengths.sum();
+            let lengths: Vec<f64> = lengths.collect();
+            let length: f64 = lengths.iter().sum();
             let Some(&((f, g), _)) = group.first() else {
                 continue;
             };
@@ -61,8 +62,8 @@ impl Bends {
             let cosine = (0..3).map(|i| n[i] * m[i]).sum::<f64>() / (norm(n) * norm(m));
             let square = cosine.clamp(-1.0, 1.0).acos().powi(2);
             let apart = (of_n + of_m) / (3.0 * length);
-            for &(_, e) in group {
-                let crease = square * slit.mesh.edge_length(e);
+            for (&(_, e), length) in group.iter().zip(lengths) {
+                let crease = square * length;
                 if crease.is_finite() && apart > 0.0 && apart.is_finite() {
                     bends.of_edge[e] = [crease, crease / apart];
                     bends.is_crease[e] = cosine < CREASE;

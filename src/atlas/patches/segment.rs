@@ -549,8 +549,7 @@ fn halves(
     let mut cut = [0.0; DIRECTIONS];
     for &f in faces {
         for h in slit.connectivity.face_halfedges(f) {
-            let Some(t) = slit.across(h) else { continue };
-            let n = slit.connectivity.face(t);
+            let Some(n) = slit.beside(h) else { continue };
             // Hardly any two neighbours have a line between them.
             let between = sets.sides[f] & !sets.sides[n];
             if between != 0 && sets.stamp[n] == stamp {
@@ -582,8 +581,8 @@ pub(super) fn borders(
     let mut borders = BTreeMap::new();
     for &f in faces {
         for h in slit.connectivity.face_halfedges(f) {
-            if let Some(t) = slit.across(h) {
-                let other = label[slit.connectivity.face(t)];
+            if let Some(n) = slit.beside(h) {
+                let other = label[n];
                 if other != own {
                     *borders.entry(other).or_insert(0.0) += slit.source_length(h);
                 }
