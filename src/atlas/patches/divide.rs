@@ -6,14 +6,19 @@
 //! division that lowers their sum lets all images together hold the surface better with as many texels: where the error falls with the square of their number,
 //! the cube of the sum is what it comes to. So each division gains a number of decibels, and the best is made first, until none gains enough.
 //!
+//! Parts of two patches may lie well in one image where the whole ones overlapped, so neighbours are united (`unite`) afterwards while that saves anything.
+//!
 //! Divisions that are tried: along creases, and by straight lines. Parts of what is injective and within the range of scale are so too; each is
 //! kept a disk. *Not guaranteed:* the best of all divisions.
+
+mod unite;
 
 use super::PatchParams;
 use super::bend::Bends;
 use super::demand::{self, Budget, Demand, Sums};
 use super::overlap::Triangle;
 use super::rectangle::smallest;
+use super::resolution::coarsest;
 use super::segment::{CLEAR, Placement, Sets, centroid, place, rounded_ln, split_at_holes};
 use super::slit::Slit;
 use crate::atlas::plane::wrap_angle;
@@ -54,8 +59,7 @@ pub(super) struct Divider<'a> {
     slit: &'a Slit<'a>,
     bends: Bends,
     budget: Budget,
-    /// Texels that an image has on its longer side at the least.
-    min_side: f64,
+    params: &'a PatchParams,
     /// Scratch space of [`Divider::by_creases`].
     label: FaceVec<u32>,
 }
@@ -70,40 +74,65 @@ impl Division {
 }
 
 impl<'a> Divider<'a> {
-    pub fn new(slit: &'a Slit<'a>, params: &PatchParams) -> Self {
+    pub fn new(slit: &'a Slit<'a>, params: &'a PatchParams) -> Self {
         Self {
             sets: Sets::new(slit),
             slit,
             bends: Bends::new(slit),
             budget: Budget::default(),
-            min_side: params.min_side as f64,
+            params,
             label: FaceVec::filled(NONE, slit.connectivity.face_count()),
         }
     }
 
-    /// Divides patches; see the module docs. `own` is scratch space, a place a copy.
+    /// Divides patches, and unites parts again; see the module docs. A patch may span this range of log scale; `own` is scratch space, a
+    /// place a copy.
     pub fn divide(
         &mut self,
         patches: Vec<Vec<FaceId>>,
-        params: &PatchParams,
+        range: f64,
         own: &mut [[f64; 2]],
     ) -> Vec<Vec<FaceId>> {
+        let patches = self.in_divisions(patches, own);
+        let mut patches = self.unite(patches, range, own);
+        for patch in &mut patches {
+            patch.sort();
+        }
+        patches.sort_by_key(|p| p.first().copied());
+        patches
+    }
+
+    /// Finds what a texel is worth where the images are these, and their cost together.
+    fn appraise(&mut self, patches: &[Vec<FaceId>], own: &mut [[f64; 2]]) -> f64 {
         let demands: Vec<Demand> = patches
             .iter()
             .map(|faces| {
-                let placement = self.placed(faces, own);
-                self.demand(faces, &placement).0
+                let (sums, border) = self.sums_and_border(faces);
+                let placement = self.placed(faces, &border, own);
+                Outline::new(self.slit, sums, &border, &placement).demand
             })
             .collect();
-        let least: Vec<f64> = demands.iter().map(|d| self.coarsest(d)).collect();
-        self.budget = demand::budget(&demands, &least, params);
-        let mut sum: f64 = demands.iter().map(|d| self.cost(d)).sum();
+        let least: Vec<f64> = demands.iter().map(|d| coarsest(d, self.params)).collect();
+        self.budget = demand::budget(&demands, &least, self.params);
+        demands.iter().map(|d| self.cost(d)).sum()
+    }
+
+    /// Makes the best division as long as one gains enough.
+    fn in_divisions(
+        &mut self,
+        patches: Vec<Vec<FaceId>>,
+        own: &mut [[f64; 2]],
+    ) -> Vec<Vec<FaceId>> {
+        let mut sum = self.appraise(&patches, own);
         let rows = patches.into_iter();
         let mut rows: Vec<Row> = rows
             .map(|faces| self.best_division(faces, f64::INFINITY, own))
             .collect();
         loop {
-            let room = params.max_count.map(|most| most.saturating_sub(rows.len()));
+            let room = self
+                .params
+                .max_count
+                .map(|most| most.saturating_sub(rows.len()));
             let fits = |d: &&Division| room.is_none_or(|room| d.parts.len() <= room + 1);
             let gain = |row: &Row| {
                 let division = row.division.as_ref().filter(fits);
@@ -121,16 +150,16 @@ impl<'a> Divider<'a> {
                 rows.push(self.best_division(faces, row.clear, own));
             }
         }
-        let mut patches: Vec<Vec<FaceId>> = rows.into_iter().map(|row| row.faces).collect();
-        for patch in &mut patches {
-            patch.sort();
-        }
-        patches.sort_by_key(|p| p.first().copied());
-        patches
+        rows.into_iter().map(|row| row.faces).collect()
     }
 
-    /// Coordinates of a patch.
-    fn placed<'p>(&mut self, faces: &[FaceId], own: &'p mut [[f64; 2]]) -> Placement<'p>
+    /// Coordinates of a patch with its border.
+    fn placed<'p>(
+        &mut self,
+        faces: &[FaceId],
+        border: &[FaceId],
+        own: &'p mut [[f64; 2]],
+    ) -> Placement<'p>
     where
         'a: 'p,
     {
@@ -139,24 +168,26 @@ impl<'a> Divider<'a> {
         let stamp = self.sets.mark(faces);
         let member = |f: FaceId| self.sets.has(f, stamp);
         let highest = highest(slit, faces);
-        place(slit, faces.iter().copied(), root, highest, member, own)
+        // The border is as large as the patch.
+        place(slit, border.iter().copied(), root, highest, member, own)
     }
 
     /// How a patch is best divided, of whose faces no two overlap by more than `clear` in the central chart.
     fn best_division(&mut self, faces: Vec<FaceId>, clear: f64, own: &mut [[f64; 2]]) -> Row {
         let slit = self.slit;
-        let placement = self.placed(&faces, own);
+        let (sums, border) = self.sums_and_border(&faces);
+        let placement = self.placed(&faces, &border, own);
         let is_central = !slit.is_deep(highest(slit, &faces));
         // Elsewhere the patch has been placed anew.
         let mut clear = if is_central { clear } else { f64::INFINITY };
-        let (demand, angle) = self.demand(&faces, &placement);
-        let now = self.cost(&demand);
+        let outline = Outline::new(slit, sums, &border, &placement);
+        let now = self.cost(&outline.demand);
         let mut tried = Vec::new();
         for side in self.by_creases(&faces) {
             tried.extend(self.sets.components(&side));
         }
         let mut tried = vec![tried];
-        tried.extend(self.by_lines(&faces, &placement, angle));
+        tried.extend(self.by_lines(&faces, &placement, &outline));
         let mut found: Vec<(i64, Division)> = Vec::new();
         for parts in tried {
             let division = self.in_parts(parts, now, &placement);
@@ -207,8 +238,9 @@ impl<'a> Divider<'a> {
         }
         let mut saved = now;
         for faces in &parts {
-            let (demand, _) = self.demand(faces, placement);
-            saved -= self.cost(&demand);
+            let (sums, border) = self.sums_and_border(faces);
+            let outline = Outline::new(self.slit, sums, &border, placement);
+            saved -= self.cost(&outline.demand);
             if saved <= 0.0 {
                 return None;
             }
@@ -241,24 +273,11 @@ impl<'a> Divider<'a> {
         (sums, border)
     }
 
-    /// What a patch asks for, and the direction of its rectangle.
-    fn demand(&mut self, faces: &[FaceId], placement: &Placement) -> (Demand, f64) {
-        let (sums, border) = self.sums_and_border(faces);
-        let corners = border.iter().map(|&f| placement.triangle(self.slit, f));
-        let corners: Vec<Triangle> = corners.collect();
-        let rectangle = smallest(&corners);
-        let sides = [rectangle.width, rectangle.width * rectangle.height];
-        (Demand { sums, sides }, wrap_angle(rectangle.angle))
-    }
-
-    /// The widest texel that an image may have.
-    fn coarsest(&self, demand: &Demand) -> f64 {
-        demand.sides[0].max(demand.sides[1]) / self.min_side
-    }
-
     /// Error and texels, as if they were one.
     fn cost(&self, demand: &Demand) -> f64 {
-        let texel = demand.texel(&self.budget).min(self.coarsest(demand));
+        let texel = demand
+            .texel(&self.budget)
+            .min(coarsest(demand, self.params));
         let cost =
             demand.error(texel) + self.budget.worth * demand.texels(texel, self.budget.margin);
         // A patch without extent has no texel.
@@ -276,6 +295,10 @@ impl<'a> Divider<'a> {
                 g.map(|g| (g, c.edge(h)))
             })
         };
+        let has_crease = |f| c.face_edges(f).into_iter().any(|e| self.bends.is_crease[e]);
+        if !faces.iter().any(|&f| has_crease(f)) {
+            return Vec::new();
+        }
         let mut parts: Vec<(Vec<FaceId>, f64)> = Vec::new();
         faces.iter().for_each(|&f| self.label[f] = NONE);
         for &first in faces {
@@ -331,7 +354,7 @@ impl<'a> Divider<'a> {
         &mut self,
         faces: &[FaceId],
         placement: &Placement,
-        angle: f64,
+        outline: &Outline,
     ) -> Vec<Vec<Vec<FaceId>>> {
         let slit = self.slit;
         let triangles = faces.iter().map(|&f| placement.triangle(slit, f));
@@ -339,7 +362,7 @@ impl<'a> Divider<'a> {
         let mut promised: Vec<(i64, usize, usize)> = Vec::new();
         let mut strips: Vec<Vec<u8>> = Vec::new();
         for direction in 0..DIRECTIONS {
-            let angle = angle + std::f64::consts::PI * direction as f64 / DIRECTIONS as f64;
+            let angle = outline.angle + std::f64::consts::PI * direction as f64 / DIRECTIONS as f64;
             let axis = [angle.cos(), angle.sin()];
             let along = |p: [f64; 2]| {
                 [
@@ -348,17 +371,21 @@ impl<'a> Divider<'a> {
                 ]
             };
             let mut range = Extent::default();
-            let turned: Vec<Triangle> = triangles.iter().map(|t| t.map(along)).collect();
-            turned.iter().flatten().for_each(|&p| range.add(p));
+            outline
+                .border
+                .iter()
+                .flatten()
+                .for_each(|&p| range.add(along(p)));
             let (low, length) = (range.low[0], range.high[0] - range.low[0]);
             let mut strip = Vec::with_capacity(faces.len());
             let mut rows = vec![(Sums::default(), Extent::default()); LINES + 1];
-            for (&f, t) in faces.iter().zip(&turned) {
-                let at = (centroid(t)[0] - low) / length.max(f64::MIN_POSITIVE);
+            for (&f, t) in faces.iter().zip(&triangles) {
+                let t = t.map(along);
+                let at = (centroid(&t)[0] - low) / length.max(f64::MIN_POSITIVE);
                 let at = (at * (LINES as f64 + OFFSET)).clamp(0.0, LINES as f64) as usize;
                 strip.push(at as u8);
                 rows[at].0 = rows[at].0.and(self.bends.of_face[f]);
-                t.iter().for_each(|&p| rows[at].1.add(p));
+                t.into_iter().for_each(|p| rows[at].1.add(p));
             }
             let below = self.running(rows.iter());
             let above = self.running(rows.iter().rev());
@@ -420,6 +447,29 @@ impl<'a> Divider<'a> {
             }
         });
         parts.collect()
+    }
+}
+
+/// What a patch asks for, and where its rectangle lies.
+struct Outline {
+    demand: Demand,
+    /// Direction of the rectangle's longer side.
+    angle: f64,
+    /// The faces that have a side on the border.
+    border: Vec<Triangle>,
+}
+
+impl Outline {
+    fn new(slit: &Slit, sums: Sums, border: &[FaceId], placement: &Placement) -> Self {
+        let border = border.iter().map(|&f| placement.triangle(slit, f));
+        let border: Vec<Triangle> = border.collect();
+        let rectangle = smallest(&border);
+        let sides = [rectangle.width, rectangle.width * rectangle.height];
+        Self {
+            demand: Demand { sums, sides },
+            angle: wrap_angle(rectangle.angle),
+            border,
+        }
     }
 }
 

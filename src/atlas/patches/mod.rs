@@ -274,11 +274,11 @@ pub fn layout(
         }
     }
     let slit = Slit::new(mesh, length, cut, development, under);
-    let sets = segment_into(&slit, params);
+    let (sets, range) = segment_into(&slit, params);
     let mut own = vec![[0.0; 2]; development.copies];
     let mut divider = Divider::new(&slit, params);
     let sets = match domain {
-        Domain::Flat => divider.divide(sets, params, &mut own),
+        Domain::Flat => divider.divide(sets, range, &mut own),
         // Every side of a patch is a rectangle more.
         Domain::Rectangle => sets,
     };
@@ -351,8 +351,8 @@ fn with_images(
     (patches, packed)
 }
 
-/// The patches' faces: at most `max_count`, as far as the range of scale decides about that.
-fn segment_into(slit: &Slit, params: &PatchParams) -> Vec<Vec<FaceId>> {
+/// The patches' faces: at most `max_count`, as far as the range of scale decides about that; and that range.
+fn segment_into(slit: &Slit, params: &PatchParams) -> (Vec<Vec<FaceId>>, f64) {
     let mut range = params.log_scale_range;
     let mut sets = segment::segment(slit, range);
     while params.max_count.is_some_and(|most| sets.len() > most) && range < WIDEST_RANGE {
@@ -362,7 +362,7 @@ fn segment_into(slit: &Slit, params: &PatchParams) -> Vec<Vec<FaceId>> {
             sets = fewer;
         }
     }
-    sets
+    (sets, range)
 }
 
 /// Rasters with their boxes in the packed square, and its side, in texels; corners count from the lower left.

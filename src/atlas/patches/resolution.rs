@@ -33,7 +33,7 @@ pub(super) struct Raster {
 /// Rasters of all patches; `sums` are their areas and bends.
 pub(super) fn rasters(patches: &[Oriented], sums: &[Sums], params: &PatchParams) -> Vec<Raster> {
     let margin = (params.padding as f64).max(0.5);
-    let most = (MAX_SIDE - 2 * params.padding.max(1)) as f64;
+    let most = densest(params);
     let demand = |(patch, sums): (&Oriented, &Sums)| {
         let width = patch.to_chart.scale;
         let sides = [width, width * patch.height];
@@ -42,7 +42,7 @@ pub(super) fn rasters(patches: &[Oriented], sums: &[Sums], params: &PatchParams)
     let demands: Vec<Demand> = patches.iter().zip(sums).map(demand).collect();
     let coarsest: Vec<f64> = patches
         .iter()
-        .map(|p| p.to_chart.scale / least_density(p, params, most))
+        .map(|p| p.to_chart.scale / least_density(p.height, p.area, params))
         .collect();
     let budget = demand::budget(&demands, &coarsest, params);
     let texels = demands.iter().zip(&coarsest);
@@ -68,13 +68,26 @@ pub(super) fn rasters(patches: &[Oriented], sums: &[Sums], params: &PatchParams)
         .collect()
 }
 
-fn least_density(patch: &Oriented, params: &PatchParams, most: f64) -> f64 {
-    let short_side = MIN_SHORT_SIDE / patch.height.max(f64::MIN_POSITIVE);
-    let area = (MIN_AREA / patch.area.max(f64::MIN_POSITIVE)).sqrt();
+/// Most texels on the longer side of a patch.
+fn densest(params: &PatchParams) -> f64 {
+    (MAX_SIDE - 2 * params.padding.max(1)) as f64
+}
+
+/// Least texels on the longer side of a patch, of which its shorter side and its area are parts.
+fn least_density(height: f64, area: f64, params: &PatchParams) -> f64 {
+    let short_side = MIN_SHORT_SIDE / height.max(f64::MIN_POSITIVE);
+    let area = (MIN_AREA / area.max(f64::MIN_POSITIVE)).sqrt();
     (params.min_side as f64)
         .max(short_side.min(ENOUGH_LONG_SIDE))
         .max(area.min(ENOUGH_LONG_SIDE))
-        .min(most)
+        .min(densest(params))
+}
+
+/// The widest texel that the image of a patch may have.
+pub(super) fn coarsest(demand: &Demand, params: &PatchParams) -> f64 {
+    let [longer, shorter] = demand.sides;
+    let area = demand.sums.flat / (longer * longer);
+    longer / least_density(shorter / longer, area, params)
 }
 
 /// Square texels, `columns` of them on the patch's width; its height in the middle of the rows.
