@@ -8,7 +8,7 @@
 //!
 //! Parts of two patches may lie well in one image where the whole ones overlapped, so neighbours are united (`unite`) afterwards while that saves anything.
 //!
-//! Divisions that are tried: along creases, and by straight lines. Parts of what is injective and within the range of scale are so too; each is
+//! Divisions that are tried: along creases, by straight lines, and between less scale and more. Parts of what is injective and within the range of scale are so too; each is
 //! kept a disk. *Not guaranteed:* the best of all divisions.
 
 mod unite;
@@ -27,16 +27,18 @@ use std::cmp::Reverse;
 use std::collections::VecDeque;
 
 /// Decibels that each patch more must gain.
-const LEAST_GAIN: f64 = 0.03;
+const LEAST_GAIN: f64 = 0.015;
 /// Directions of lines, from that of the patch's rectangle on.
 const DIRECTIONS: usize = 4;
 /// Lines that are estimated in each direction; the ends of their strips meet no regular grid.
 const LINES: usize = 40;
 const OFFSET: f64 = 0.3719;
 /// The best of them that are looked at closely.
-const CANDIDATES: usize = 2;
-/// A part smaller than this share of the patch goes to the other side of the line, or of the crease.
+const CANDIDATES: usize = 3;
+/// A part with less than this share of the patch's area and of its bend goes to the other side of the line, or of the crease.
 const CRUMB: f64 = 0.02;
+/// Thresholds of scale that are tried lie this far apart, or a little less.
+const SCALE_STEP: f64 = 0.5;
 
 /// A patch in parts.
 struct Division {
@@ -188,6 +190,7 @@ impl<'a> Divider<'a> {
         }
         let mut tried = vec![tried];
         tried.extend(self.by_lines(&faces, &placement, &outline));
+        tried.extend(self.by_scale(&faces));
         let mut found: Vec<(i64, Division)> = Vec::new();
         for parts in tried {
             let division = self.in_parts(parts, now, &placement);
@@ -410,6 +413,23 @@ impl<'a> Divider<'a> {
         sides.collect()
     }
 
+    /// Connected parts of less scale and of more: a texel is of one width in the plane, so where scale is least the surface is held worst.
+    fn by_scale(&mut self, faces: &[FaceId]) -> Vec<Vec<Vec<FaceId>>> {
+        let slit = self.slit;
+        let scales = faces.iter().map(|&f| slit.log_scale[f]);
+        let lowest = scales.fold(f64::INFINITY, f64::min);
+        let range = highest(slit, faces) - lowest;
+        let steps = (range / SCALE_STEP).ceil().min(64.0) as usize;
+        let thresholds = (1..steps).map(|i| lowest + range * i as f64 / steps as f64);
+        let thresholds: Vec<f64> = thresholds.collect();
+        let sides = thresholds.into_iter().map(|most| {
+            let is_below = faces.iter().map(|&f| slit.log_scale[f] <= most);
+            let is_below: Vec<bool> = is_below.collect();
+            self.without_crumbs(faces, &is_below)
+        });
+        sides.collect()
+    }
+
     /// Cost of the rows so far, for every number of rows.
     fn running<'r>(&self, rows: impl Iterator<Item = &'r (Sums, Extent)>) -> Vec<f64> {
         let (mut sums, mut extent) = (Sums::default(), Extent::default());
@@ -425,16 +445,21 @@ impl<'a> Divider<'a> {
 
     /// Connected parts of the two sides, small pieces in the side that surrounds them.
     fn without_crumbs(&mut self, faces: &[FaceId], is_below: &[bool]) -> Vec<Vec<FaceId>> {
-        let slit = self.slit;
-        let area = |part: &[FaceId]| part.iter().map(|&f| slit.source_area[f]).sum::<f64>();
-        let least = CRUMB * area(faces);
+        // Few texels hold a small piece, unless it bends most.
+        let weights = |part: &[FaceId]| {
+            let sums = part.iter().map(|&f| self.bends.of_face[f]);
+            let sums = sums.fold(Sums::default(), Sums::and);
+            [sums.area, sums.bend[1]]
+        };
+        let least = weights(faces).map(|weight| CRUMB * weight);
         let mut sides: [Vec<Vec<FaceId>>; 2] = Default::default();
         let mut is_whole = true;
         for side in [false, true] {
             let own = faces.iter().zip(is_below).filter(|row| *row.1 == side);
             let own: Vec<FaceId> = own.map(|row| *row.0).collect();
             for component in self.sets.components(&own) {
-                let is_small = area(&component) < least;
+                let own = weights(&component);
+                let is_small = own[0] < least[0] && own[1] <= least[1];
                 is_whole &= !is_small;
                 sides[usize::from(side != is_small)].push(component);
             }

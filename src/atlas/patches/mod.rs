@@ -274,7 +274,7 @@ pub fn layout(
         }
     }
     let slit = Slit::new(mesh, length, cut, development, under);
-    let (sets, range) = segment_into(&slit, params);
+    let (sets, range) = segment_into(&slit, domain, params);
     let mut own = vec![[0.0; 2]; development.copies];
     let mut divider = Divider::new(&slit, params);
     let sets = match domain {
@@ -352,12 +352,12 @@ fn with_images(
 }
 
 /// The patches' faces: at most `max_count`, as far as the range of scale decides about that; and that range.
-fn segment_into(slit: &Slit, params: &PatchParams) -> (Vec<Vec<FaceId>>, f64) {
+fn segment_into(slit: &Slit, domain: Domain, params: &PatchParams) -> (Vec<Vec<FaceId>>, f64) {
     let mut range = params.log_scale_range;
-    let mut sets = segment::segment(slit, range);
+    let mut sets = segment::segment(slit, range, domain);
     while params.max_count.is_some_and(|most| sets.len() > most) && range < WIDEST_RANGE {
         range = (2.0 * range).min(WIDEST_RANGE);
-        let fewer = segment::segment(slit, range);
+        let fewer = segment::segment(slit, range, domain);
         if fewer.len() < sets.len() {
             sets = fewer;
         }

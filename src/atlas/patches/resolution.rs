@@ -6,14 +6,14 @@ use super::raster::{cover, to_texel};
 use super::rectangle::Oriented;
 use super::{MAX_SIDE, PatchParams};
 
-/// Least texels on the shorter side, where that does not make the longer one absurd.
+/// Least texels on the shorter side, where that does not make the longer one absurd …
 const MIN_SHORT_SIDE: f64 = 8.0;
+/// … or this part of what the longer side must have, where that is less: who asks for small images wants them narrow too.
+const MIN_SHORT_PART: f64 = 0.5;
 /// The shorter side asks for no more than this on the longer one.
 const ENOUGH_LONG_SIDE: f64 = 1024.0;
-/// Least texel areas inside a patch.
-const MIN_AREA: f64 = 64.0;
-/// Least texel centres inside a patch.
-const MIN_COVERED: usize = 24;
+/// Part of the texels in a square of the least shorter side whose centres a patch covers.
+const MIN_COVERED: f64 = 0.375;
 
 /// The raster of one patch.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,6 +45,7 @@ pub(super) fn rasters(patches: &[Oriented], sums: &[Sums], params: &PatchParams)
         .map(|p| p.to_chart.scale / least_density(p.height, p.area, params))
         .collect();
     let budget = demand::budget(&demands, &coarsest, params);
+    let least = least_covered(params);
     let texels = demands.iter().zip(&coarsest);
     let texels = texels.map(|(demand, &coarsest)| demand.texel(&budget).min(coarsest));
     patches
@@ -56,7 +57,7 @@ pub(super) fn rasters(patches: &[Oriented], sums: &[Sums], params: &PatchParams)
             let mut columns = (density.min(most) + 0.5).floor().max(1.0);
             loop {
                 let raster = isotropic(patch.height, columns, margin);
-                if covered(patch, &raster) >= MIN_COVERED {
+                if covered(patch, &raster, least) >= least {
                     return raster;
                 }
                 if columns >= most {
@@ -73,10 +74,21 @@ fn densest(params: &PatchParams) -> f64 {
     (MAX_SIDE - 2 * params.padding.max(1)) as f64
 }
 
+/// Least texels on the shorter side.
+fn least_short(params: &PatchParams) -> f64 {
+    (MIN_SHORT_PART * params.min_side as f64).min(MIN_SHORT_SIDE)
+}
+
+/// Least texel centres inside a patch.
+fn least_covered(params: &PatchParams) -> usize {
+    (MIN_COVERED * least_short(params).powi(2)).ceil() as usize
+}
+
 /// Least texels on the longer side of a patch, of which its shorter side and its area are parts.
 fn least_density(height: f64, area: f64, params: &PatchParams) -> f64 {
-    let short_side = MIN_SHORT_SIDE / height.max(f64::MIN_POSITIVE);
-    let area = (MIN_AREA / area.max(f64::MIN_POSITIVE)).sqrt();
+    let least = least_short(params);
+    let short_side = least / height.max(f64::MIN_POSITIVE);
+    let area = least / area.max(f64::MIN_POSITIVE).sqrt();
     (params.min_side as f64)
         .max(short_side.min(ENOUGH_LONG_SIDE))
         .max(area.min(ENOUGH_LONG_SIDE))
@@ -121,16 +133,16 @@ fn raster(height: f64, columns: f64, density: [f64; 2], rows: f64, margin: f64) 
 }
 
 /// Number of texel centres inside the patch, up to a little more than what is asked for.
-fn covered(patch: &Oriented, raster: &Raster) -> usize {
+fn covered(patch: &Oriented, raster: &Raster, least: usize) -> usize {
     let mut seen = std::collections::BTreeSet::new();
     for t in &patch.uv {
         let t = t.map(|p| to_texel(&raster.texel_to_patch, p));
         cover(t, raster.width, raster.height, |x, y, _| {
-            if seen.len() < MIN_COVERED {
+            if seen.len() < least {
                 seen.insert((x, y));
             }
         });
-        if seen.len() >= MIN_COVERED {
+        if seen.len() >= least {
             break;
         }
     }
@@ -212,7 +224,7 @@ mod tests {
                     assert!(y >= margin && y <= r.height as f64 - margin, "{y} {r:?}");
                 }
                 assert!(r.width.max(r.height) <= MAX_SIDE);
-                assert!(height == 0.0 || covered(&patch, r) >= MIN_COVERED);
+                assert!(height == 0.0 || covered(&patch, r, 24) >= least_covered(&params));
             }
         }
     }

@@ -8,11 +8,12 @@
 //!    the largest hole, until there is none. (The sheet itself makes no holes: an immersed disk whose
 //!    border is a simple curve is embedded, so what a patch surrounds in the plane belongs to it.)
 //! 4. Merge neighbours while all three conditions hold, smallest first (`merge`); divide small patches
-//!    among their neighbours where none can take them whole, and let what is still tiny grow (`dissolve`).
+//!    among their neighbours where none can take them whole; what is still tiny and is to become rectangles grows (`dissolve`).
 //!
 //! Everything that is compared is rounded first and ties go to the lower id, so that a change in the
 //! last digits of the metric does not change the patches.
 
+use super::Domain;
 use super::dissolve::{dissolve, widen};
 use super::merge::merge;
 use super::overlap::{Triangle, TriangleIndex, size};
@@ -122,7 +123,7 @@ pub(super) fn place<'a>(
 }
 
 /// Divides the slit disk; every face is in exactly one set. `range` bounds the regional log scale of each.
-pub(super) fn segment(slit: &Slit, range: f64) -> Vec<Vec<FaceId>> {
+pub(super) fn segment(slit: &Slit, range: f64, domain: Domain) -> Vec<Vec<FaceId>> {
     let mut sets = Sets::new(slit);
     let total: f64 = slit.source_area.iter().sum();
     let mut own = vec![[0.0; 2]; slit.development.copies];
@@ -177,7 +178,11 @@ pub(super) fn segment(slit: &Slit, range: f64) -> Vec<Vec<FaceId>> {
             break;
         }
     }
-    let mut patches = widen(slit, patches, range, &mut own);
+    // A small flat image costs less than the ragged border that a crumb leaves in its neighbours.
+    let mut patches = match domain {
+        Domain::Flat => patches,
+        Domain::Rectangle => widen(slit, patches, range, &mut own),
+    };
     for patch in &mut patches {
         patch.sort();
     }
