@@ -162,7 +162,7 @@ pub struct PatchParams {
     pub log_scale_range: f64,
     /// Texels of all images of a component together (about).
     pub texel_budget: usize,
-    /// Least texels on the longer side of an image. Beyond that a patch keeps some texels on its shorter side and inside,
+    /// Least texels on the longer side of an image. Beyond that a patch keeps half as many, and at most 8, on its shorter side, and some inside,
     /// so that a budget too small for all patches together is exceeded.
     pub min_side: usize,
     /// Texels between patches in the packed square, and around each image.
