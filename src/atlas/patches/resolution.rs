@@ -207,6 +207,19 @@ mod tests {
     }
 
     #[test]
+    fn small_least_sides_hold_for_the_shorter_side_too() {
+        let columns = |min_side| {
+            let params = PatchParams {
+                texel_budget: 1,
+                min_side,
+                ..PatchParams::default()
+            };
+            rasters(&[rectangle(0.1)], &[even(1.0, 0.1)], &params)[0].density
+        };
+        assert_eq!([4, 8, 16, 32].map(columns), [20.0, 40.0, 80.0, 80.0]);
+    }
+
+    #[test]
     fn every_patch_lies_in_its_image_and_is_covered() {
         for padding in [0, 1, 5] {
             let params = PatchParams {
