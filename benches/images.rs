@@ -1,8 +1,8 @@
 //! How well geometry images hold a surface, at equal total texels: ours in both domains, beside the same sampler on the atlases of other programs.
 //!
-//! `cargo bench --bench images -- [--peers DIR] MESH…`: 128², 256² and 512² texels in all images together, their margins included. DIR holds
+//! `cargo bench --bench images -- [--peers DIR] [--flat] MESH…`: 128², 256² and 512² texels in all images together, their margins included. DIR holds
 //! `NAME.TOOL.obj`, the mesh with the texture coordinates of a tool, as `benches/peers/atlases.py` writes them. PSNR is
-//! 20 log10(diagonal / symmetric RMS distance) of the mesh that is rebuilt from images and seam samples. Nothing here is timed.
+//! 20 log10(diagonal / symmetric RMS distance) of the mesh that is rebuilt from images and seam samples. `--flat` leaves rectangles out. Nothing here is timed.
 
 mod common;
 
@@ -28,10 +28,12 @@ const MIN_SIDE: usize = 8;
 fn main() -> Result<(), Box<dyn Error>> {
     let mut peers: Option<PathBuf> = None;
     let mut meshes: Vec<PathBuf> = Vec::new();
+    let mut domains = vec![Domain::Flat, Domain::Rectangle];
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--peers" => peers = Some(arguments.next().ok_or("--peers needs a folder")?.into()),
+            "--flat" => domains = vec![Domain::Flat],
             // What cargo adds.
             "--bench" => {}
             _ => meshes.push(argument.into()),
@@ -42,7 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for path in &meshes {
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
         let asset = read::read(path, &Default::default())?;
-        for domain in [Domain::Flat, Domain::Rectangle] {
+        for &domain in &domains {
             let label = match domain {
                 Domain::Flat => "ours, flat",
                 Domain::Rectangle => "ours, rectangle",

@@ -260,28 +260,32 @@ impl GeometryImage {
 /// row the lower envelope of the parabolas `(x − column)² + distance²`. Whole numbers throughout.
 pub(crate) fn nearest_sources(sources: &[bool], width: usize) -> Vec<usize> {
     let mut nearest: Vec<usize> = (0..sources.len()).collect();
-    if width == 0 || !sources.contains(&true) {
+    // Where all are sources, as in rectangles, or none is.
+    if width == 0 || !sources.contains(&true) || !sources.contains(&false) {
         return nearest;
     }
     let height = sources.len() / width;
     // Row of the nearest source in the column, `height` where the column has none.
     let mut in_column = vec![height; sources.len()];
-    for x in 0..width {
-        let mut last = height;
-        for y in 0..height {
-            if sources[width * y + x] {
-                last = y;
+    // Row by row, as they lie in memory: the last source above each texel, then the next one below.
+    let mut near = vec![height; width];
+    for (y, (row, sources)) in rows_of(&mut in_column, sources, width) {
+        for (x, near) in near.iter_mut().enumerate() {
+            if sources[x] {
+                *near = y;
             }
-            in_column[width * y + x] = last;
+            row[x] = *near;
         }
-        let mut next = height;
-        for y in (0..height).rev() {
-            if sources[width * y + x] {
-                next = y;
+    }
+    near.fill(height);
+    for (y, (row, sources)) in rows_of(&mut in_column, sources, width).rev() {
+        for (x, next) in near.iter_mut().enumerate() {
+            if sources[x] {
+                *next = y;
             }
-            let above = in_column[width * y + x];
-            if next < height && (above == height || next - y < y - above) {
-                in_column[width * y + x] = next;
+            let above = row[x];
+            if *next < height && (above == height || *next - y < y - above) {
+                row[x] = *next;
             }
         }
     }
@@ -322,6 +326,17 @@ pub(crate) fn nearest_sources(sources: &[bool], width: usize) -> Vec<usize> {
         }
     }
     nearest
+}
+
+/// Rows of two images of one width, numbered.
+fn rows_of<'a>(
+    a: &'a mut [usize],
+    b: &'a [bool],
+    width: usize,
+) -> impl DoubleEndedIterator<Item = (usize, (&'a mut [usize], &'a [bool]))> {
+    a.chunks_exact_mut(width)
+        .zip(b.chunks_exact(width))
+        .enumerate()
 }
 
 #[cfg(test)]

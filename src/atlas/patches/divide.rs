@@ -6,33 +6,39 @@
 //! division that lowers their sum lets all images together hold the surface better with as many texels: where the error falls with the square of their number,
 //! the cube of the sum is what it comes to. So each division gains a number of decibels, and the best is made first, until none gains enough.
 //!
-//! Divisions that are tried: along creases, and by straight lines. Parts of what is injective and within the range of scale are so too; each is
+//! Parts of two patches may lie well in one image where the whole ones overlapped, so neighbours are united (`unite`) afterwards while that saves anything.
+//!
+//! Divisions that are tried: along creases, by straight lines, and between less scale and more. Parts of what is injective and within the range of scale are so too; each is
 //! kept a disk. *Not guaranteed:* the best of all divisions.
 
+mod unite;
+
+use super::PatchParams;
+use super::bend::Bends;
 use super::demand::{self, Budget, Demand, Sums};
-use super::rectangle::in_rectangle;
-use super::segment::{Placement, Sets, centroid, place, rounded_ln, split_at_holes};
+use super::overlap::Triangle;
+use super::rectangle::smallest;
+use super::resolution::coarsest;
+use super::segment::{CLEAR, Placement, Sets, centroid, place, rounded_ln, split_at_holes};
 use super::slit::Slit;
-use super::{Domain, PatchParams};
-use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, FaceVec, HalfedgeId, NONE};
-use crate::geometry::mesh::{Mesh, cross, norm, sub};
-use rustc_hash::FxHashMap;
+use crate::atlas::plane::wrap_angle;
+use crate::geometry::ids::{FaceId, FaceVec, NONE};
 use std::cmp::Reverse;
 use std::collections::VecDeque;
 
 /// Decibels that each patch more must gain.
-const LEAST_GAIN: f64 = 0.03;
+const LEAST_GAIN: f64 = 0.015;
 /// Directions of lines, from that of the patch's rectangle on.
 const DIRECTIONS: usize = 4;
 /// Lines that are estimated in each direction; the ends of their strips meet no regular grid.
 const LINES: usize = 40;
 const OFFSET: f64 = 0.3719;
 /// The best of them that are looked at closely.
-const CANDIDATES: usize = 2;
-/// Cosine of the dihedral angle of a crease.
-const CREASE: f64 = 0.8;
-/// A part smaller than this share of the patch goes to the other side of the line, or of the crease.
+const CANDIDATES: usize = 3;
+/// A part with less than this share of the patch's area and of its bend goes to the other side of the line, or of the crease.
 const CRUMB: f64 = 0.02;
+/// Thresholds of scale that are tried lie this far apart, or a little less.
+const SCALE_STEP: f64 = 0.5;
 
 /// A patch in parts.
 struct Division {
@@ -41,70 +47,29 @@ struct Division {
     saved: f64,
 }
 
-struct Divider<'a> {
-    sets: Sets<'a>,
-    slit: &'a Slit<'a>,
-    budget: Budget,
-    /// Texels that an image has on its longer side at the least.
-    min_side: f64,
-    /// Areas of every face, and the bend of its edges, half of which belongs to the face on the other side.
-    faces: FaceVec<Sums>,
-    /// θ² L, and that over a.
-    bend: EdgeVec<[f64; 2]>,
-    /// Scratch space of [`Divider::by_creases`].
-    label: FaceVec<u32>,
-    is_crease: EdgeVec<bool>,
-    /// Whether lines are tried: rectangles have lines of their own.
-    with_lines: bool,
+/// A patch with the division that saves most.
+struct Row {
+    faces: Vec<FaceId>,
+    division: Option<Division>,
+    /// Where it is placed like the central chart: by how much two of its faces overlap at the most. Infinite where nobody has looked.
+    clear: f64,
 }
 
-/// Divides patches; see the module docs. `own` is scratch space, a place a copy.
-pub(super) fn divide(
-    slit: &Slit,
-    patches: Vec<Vec<FaceId>>,
-    domain: Domain,
-    params: &PatchParams,
-    own: &mut [[f64; 2]],
-) -> Vec<Vec<FaceId>> {
-    let mut divider = Divider::new(slit, params);
-    divider.with_lines = domain == Domain::Flat;
-    let demands: Vec<Demand> = patches
-        .iter()
-        .map(|faces| {
-            divider.placed(faces, own, |divider, placement| {
-                divider.demand(faces, placement).0
-            })
-        })
-        .collect();
-    let least: Vec<f64> = demands.iter().map(|d| divider.coarsest(d)).collect();
-    divider.budget = demand::budget(&demands, &least, params);
-    let mut rows: Vec<(Vec<FaceId>, Option<Division>)> = Vec::new();
-    let mut sum: f64 = demands.iter().map(|d| divider.cost(d)).sum();
-    for faces in patches {
-        let division = divider.best_division(&faces, own);
-        rows.push((faces, division));
-    }
-    loop {
-        let room = params.max_count.map(|most| most.saturating_sub(rows.len()));
-        let fits = |d: &&Division| room.is_none_or(|room| d.parts.len() <= room + 1);
-        let gain = |row: &(Vec<FaceId>, Option<Division>)| {
-            let division = row.1.as_ref().filter(fits);
-            division.map_or(0.0, |division| division.gain(sum))
-        };
-        // Rounded: the last digits must not decide.
-        let best = (0..rows.len()).max_by_key(|&i| ((gain(&rows[i]) * 1e6) as i64, Reverse(i)));
-        let Some(best) = best.filter(|&i| gain(&rows[i]) >= LEAST_GAIN) else {
-            break;
-        };
-        let (_, division) = rows.swap_remove(best);
-        let Some(division) = division else { break };
-        sum -= division.saved;
-        for faces in division.parts {
-            let division = divider.best_division(&faces, own);
-            rows.push((faces, division));
-        }
-    }
-    let mut patches: Vec<Vec<FaceId>> = rows.into_iter().map(|row| row.0).collect();
+/// What division needs to know of a surface, and scratch space.
+pub(super) struct Divider<'a> {
+    sets: Sets<'a>,
+    slit: &'a Slit<'a>,
+    bends: Bends,
+    budget: Budget,
+    params: &'a PatchParams,
+    /// Scratch space of [`Divider::by_creases`].
+    label: FaceVec<u32>,
+    /// Whether nothing but creases divides.
+    only_creases: bool,
+}
+
+/// Faces of every patch ascending, patches by their first face.
+fn in_order(mut patches: Vec<Vec<FaceId>>) -> Vec<Vec<FaceId>> {
     for patch in &mut patches {
         patch.sort();
     }
@@ -121,148 +86,183 @@ impl Division {
     }
 }
 
-/// θ² L and θ² L / a of every edge that is not cut, and whether it is a crease.
-///
-/// Faces that are parts of one face of the source lie in its plane however narrow they are, so that normals, and the distance a, are those of
-/// source faces.
-pub(crate) fn bends(
-    mesh: &Mesh,
-    area: &FaceVec<f64>,
-    across: impl Fn(HalfedgeId) -> Option<HalfedgeId>,
-) -> (EdgeVec<[f64; 2]>, EdgeVec<bool>) {
-    let c = &mesh.connectivity;
-    let source = &mesh.source_face;
-    let extent = mesh.diagonal().max(f64::MIN_POSITIVE);
-    let mut normals: FxHashMap<u32, ([f64; 3], f64)> = FxHashMap::default();
-    for f in c.faces() {
-        let p = mesh.face_positions(f);
-        let side = |k: usize| sub(p[k], p[0]).map(|x| x / extent);
-        let n = cross(side(1), side(2));
-        let (sum, whole) = normals.entry(source[f]).or_default();
-        (0..3).for_each(|i| sum[i] += n[i]);
-        *whole += area[f];
-    }
-    let between = |e: EdgeId| {
-        let h = c.edge_halfedge(e);
-        let t = across(h)?;
-        let (f, g) = (source[c.face(h)], source[c.face(t)]);
-        (f != g).then(|| (f.min(g), f.max(g)))
-    };
-    let mut lengths: FxHashMap<(u32, u32), f64> = FxHashMap::default();
-    for e in c.edges() {
-        if let Some(pair) = between(e) {
-            *lengths.entry(pair).or_default() += mesh.edge_length(e);
-        }
-    }
-    let mut bend = EdgeVec::filled([0.0; 2], c.edge_count());
-    let mut is_crease = EdgeVec::filled(false, c.edge_count());
-    for e in c.edges() {
-        let Some(pair) = between(e) else { continue };
-        let ((n, of_n), (m, of_m)) = (normals[&pair.0], normals[&pair.1]);
-        let cosine = (0..3).map(|i| n[i] * m[i]).sum::<f64>() / (norm(n) * norm(m));
-        let crease = cosine.clamp(-1.0, 1.0).acos().powi(2) * mesh.edge_length(e);
-        let apart = (of_n + of_m) / (3.0 * lengths[&pair]);
-        if crease.is_finite() && apart > 0.0 && apart.is_finite() {
-            bend[e] = [crease, crease / apart];
-            is_crease[e] = cosine < CREASE;
-        }
-    }
-    (bend, is_crease)
-}
-
-/// Areas and bend of patches.
-pub(super) fn sums(slit: &Slit, patches: &[Vec<FaceId>], params: &PatchParams) -> Vec<Sums> {
-    let mut divider = Divider::new(slit, params);
-    patches.iter().map(|faces| divider.sums(faces)).collect()
-}
-
 impl<'a> Divider<'a> {
-    fn new(slit: &'a Slit<'a>, params: &PatchParams) -> Self {
-        let (bend, is_crease) = bends(slit.mesh, &slit.source_area, |h| slit.across(h));
-        let faces = slit.connectivity.faces();
-        let faces = faces.map(|f| of_face(slit, &bend, f, |_| true)).collect();
+    pub fn new(slit: &'a Slit<'a>, params: &'a PatchParams) -> Self {
         Self {
             sets: Sets::new(slit),
             slit,
+            bends: Bends::new(slit),
             budget: Budget::default(),
-            min_side: params.min_side as f64,
-            faces,
-            bend,
+            params,
             label: FaceVec::filled(NONE, slit.connectivity.face_count()),
-            is_crease,
-            with_lines: true,
+            only_creases: false,
         }
     }
 
-    /// Calls with the coordinates of a patch.
-    fn placed<T>(
+    /// Divides patches, and unites parts again; see the module docs. A patch may span this range of log scale; `own` is scratch space, a
+    /// place a copy.
+    pub fn divide(
+        &mut self,
+        patches: Vec<Vec<FaceId>>,
+        range: f64,
+        own: &mut [[f64; 2]],
+    ) -> Vec<Vec<FaceId>> {
+        let patches = self.in_divisions(patches, own);
+        in_order(self.unite(patches, range, own))
+    }
+
+    /// Divides patches where creases are, and nowhere else.
+    pub fn divide_along_creases(
+        &mut self,
+        patches: Vec<Vec<FaceId>>,
+        own: &mut [[f64; 2]],
+    ) -> Vec<Vec<FaceId>> {
+        self.only_creases = true;
+        in_order(self.in_divisions(patches, own))
+    }
+
+    /// Finds what a texel is worth where the images are these, and their cost together.
+    fn appraise(&mut self, patches: &[Vec<FaceId>], own: &mut [[f64; 2]]) -> f64 {
+        let demands: Vec<Demand> = patches
+            .iter()
+            .map(|faces| {
+                let (sums, border) = self.sums_and_border(faces);
+                let placement = self.placed(faces, &border, own);
+                Outline::new(self.slit, sums, &border, &placement).demand
+            })
+            .collect();
+        let least: Vec<f64> = demands.iter().map(|d| coarsest(d, self.params)).collect();
+        self.budget = demand::budget(&demands, &least, self.params);
+        demands.iter().map(|d| self.cost(d)).sum()
+    }
+
+    /// Makes the best division as long as one gains enough.
+    fn in_divisions(
+        &mut self,
+        patches: Vec<Vec<FaceId>>,
+        own: &mut [[f64; 2]],
+    ) -> Vec<Vec<FaceId>> {
+        let mut sum = self.appraise(&patches, own);
+        let rows = patches.into_iter();
+        let mut rows: Vec<Row> = rows
+            .map(|faces| self.best_division(faces, f64::INFINITY, own))
+            .collect();
+        loop {
+            let room = self
+                .params
+                .max_count
+                .map(|most| most.saturating_sub(rows.len()));
+            let fits = |d: &&Division| room.is_none_or(|room| d.parts.len() <= room + 1);
+            let gain = |row: &Row| {
+                let division = row.division.as_ref().filter(fits);
+                division.map_or(0.0, |division| division.gain(sum))
+            };
+            // Rounded: the last digits must not decide.
+            let best = (0..rows.len()).max_by_key(|&i| ((gain(&rows[i]) * 1e6) as i64, Reverse(i)));
+            let Some(best) = best.filter(|&i| gain(&rows[i]) >= LEAST_GAIN) else {
+                break;
+            };
+            let row = rows.swap_remove(best);
+            let Some(division) = row.division else { break };
+            sum -= division.saved;
+            for faces in division.parts {
+                rows.push(self.best_division(faces, row.clear, own));
+            }
+        }
+        rows.into_iter().map(|row| row.faces).collect()
+    }
+
+    /// Coordinates of a patch with its border.
+    fn placed<'p>(
         &mut self,
         faces: &[FaceId],
-        own: &mut [[f64; 2]],
-        then: impl FnOnce(&mut Self, &Placement) -> T,
-    ) -> T {
+        border: &[FaceId],
+        own: &'p mut [[f64; 2]],
+    ) -> Placement<'p>
+    where
+        'a: 'p,
+    {
         let slit = self.slit;
-        let highest = faces.iter().map(|&f| slit.log_scale[f]);
-        let highest = highest.fold(f64::NEG_INFINITY, f64::max);
         let root = faces.iter().copied().min().unwrap_or(FaceId::new(0));
         let stamp = self.sets.mark(faces);
         let member = |f: FaceId| self.sets.has(f, stamp);
-        let placement = place(slit, faces.iter().copied(), root, highest, member, own);
-        then(self, &placement)
+        let highest = highest(slit, faces);
+        // The border is as large as the patch.
+        place(slit, border.iter().copied(), root, highest, member, own)
     }
 
-    /// How a patch is best divided.
-    fn best_division(&mut self, faces: &[FaceId], own: &mut [[f64; 2]]) -> Option<Division> {
-        self.placed(faces, own, |divider, placement| {
-            let (demand, angle) = divider.demand(faces, placement);
-            let now = divider.cost(&demand);
-            let mut tried = vec![divider.by_creases(faces)];
-            if divider.with_lines {
-                tried.extend(divider.by_lines(faces, placement, angle));
+    /// How a patch is best divided, of whose faces no two overlap by more than `clear` in the central chart.
+    fn best_division(&mut self, faces: Vec<FaceId>, clear: f64, own: &mut [[f64; 2]]) -> Row {
+        let slit = self.slit;
+        let (sums, border) = self.sums_and_border(&faces);
+        let placement = self.placed(&faces, &border, own);
+        let is_central = !slit.is_deep(highest(slit, &faces));
+        // Elsewhere the patch has been placed anew.
+        let mut clear = if is_central { clear } else { f64::INFINITY };
+        let outline = Outline::new(slit, sums, &border, &placement);
+        let now = self.cost(&outline.demand);
+        let mut tried = Vec::new();
+        for side in self.by_creases(&faces) {
+            tried.extend(self.sets.components(&side));
+        }
+        let mut tried = vec![tried];
+        if !self.only_creases {
+            tried.extend(self.by_lines(&faces, &placement, &outline));
+            tried.extend(self.by_scale(&faces));
+        }
+        let mut found: Vec<(i64, Division)> = Vec::new();
+        for parts in tried {
+            let division = self.in_parts(parts, now, &placement);
+            found.extend(division.map(|division| {
+                let share = division.saved / now.max(f64::MIN_POSITIVE);
+                let more = division.parts.len() as f64 - 1.0;
+                (-(share / more * 1e9) as i64, division)
+            }));
+        }
+        // Stable: of equals the first.
+        found.sort_by_key(|f| f.0);
+        let mut has_looked = false;
+        let mut is_injective = |faces_of_part: &Vec<FaceId>| {
+            let part = faces_of_part.iter().copied();
+            let part = Placement::new(slit, placement.positions, part);
+            if part.tolerance() < clear && !has_looked {
+                has_looked = true;
+                let least = CLEAR * placement.tolerance();
+                if placement.is_injective_by(slit, &faces, least) {
+                    clear = least;
+                }
             }
-            let mut found: Vec<(i64, Division)> = Vec::new();
-            for sides in tried {
-                let division = divider.in_parts(sides, now, placement);
-                found.extend(division.map(|division| {
-                    let share = division.saved / now.max(f64::MIN_POSITIVE);
-                    let more = division.parts.len() as f64 - 1.0;
-                    (-(share / more * 1e9) as i64, division)
-                }));
-            }
-            // Stable: of equals the first.
-            found.sort_by_key(|f| f.0);
-            let mut found = found.into_iter().map(|f| f.1);
-            found.find(|division| {
-                division.parts.iter().all(|faces| {
-                    let positions = placement.positions;
-                    let own = Placement::new(divider.slit, positions, faces.iter().copied());
-                    own.is_injective(divider.slit, faces)
-                })
-            })
-        })
+            part.tolerance() >= clear || part.is_injective(slit, faces_of_part)
+        };
+        let mut found = found.into_iter().map(|f| f.1);
+        let division = found.find(|division| division.parts.iter().all(&mut is_injective));
+        let clear = if is_central { clear } else { f64::INFINITY };
+        Row {
+            faces,
+            division,
+            clear,
+        }
     }
 
-    /// The parts of several sides that are disks; `None` where there is one part only, or they cost more.
+    /// A division into the disks that connected parts are made of; `None` where there is one only, or they cost more.
     fn in_parts(
         &mut self,
-        sides: Vec<Vec<FaceId>>,
+        connected: Vec<Vec<FaceId>>,
         now: f64,
         placement: &Placement,
     ) -> Option<Division> {
         let mut parts = Vec::new();
-        for side in sides {
-            for component in self.sets.components(&side) {
-                split_at_holes(&mut self.sets, component, placement, &mut parts);
-            }
+        for part in connected {
+            split_at_holes(&mut self.sets, part, placement, &mut parts);
         }
         if parts.len() < 2 {
             return None;
         }
         let mut saved = now;
         for faces in &parts {
-            let own = Placement::new(self.slit, placement.positions, faces.iter().copied());
-            let (demand, _) = self.demand(faces, &own);
-            saved -= self.cost(&demand);
+            let (sums, border) = self.sums_and_border(faces);
+            let outline = Outline::new(self.slit, sums, &border, placement);
+            saved -= self.cost(&outline.demand);
             if saved <= 0.0 {
                 return None;
             }
@@ -271,39 +271,35 @@ impl<'a> Divider<'a> {
     }
 
     /// Areas and bend of a patch.
-    fn sums(&mut self, faces: &[FaceId]) -> Sums {
+    pub fn sums(&mut self, faces: &[FaceId]) -> Sums {
+        self.sums_and_border(faces).0
+    }
+
+    /// Areas and bend of a patch, and its faces that have a side on its border.
+    fn sums_and_border(&mut self, faces: &[FaceId]) -> (Sums, Vec<FaceId>) {
         let slit = self.slit;
         let stamp = self.sets.mark(faces);
+        let mut border = Vec::new();
         let mut sums = Sums::default();
         for &f in faces {
-            let inner = |h: &HalfedgeId| {
-                let other = slit.across(*h).map(|t| slit.connectivity.face(t));
-                other.is_some_and(|g| self.sets.has(g, stamp))
+            let is_inside = |g| self.sets.has(g, stamp);
+            let beside = slit.neighbours(f).filter(|&g| is_inside(g));
+            let own = if beside.count() == 3 {
+                self.bends.of_face[f]
+            } else {
+                border.push(f);
+                self.bends.inside(slit, f, is_inside)
             };
-            sums = sums.and(of_face(slit, &self.bend, f, inner));
+            sums = sums.and(own);
         }
-        sums
-    }
-
-    /// What a patch asks for, and the direction of its rectangle.
-    fn demand(&mut self, faces: &[FaceId], placement: &Placement) -> (Demand, f64) {
-        let sums = self.sums(faces);
-        let slit = self.slit;
-        let corners: Vec<_> = faces.iter().map(|&f| placement.triangle(slit, f)).collect();
-        let rectangle = in_rectangle(&corners, sums.flat);
-        let width = rectangle.to_chart.scale;
-        let sides = [width, width * rectangle.height];
-        (Demand { sums, sides }, rectangle.to_chart.rotation)
-    }
-
-    /// The widest texel that an image may have.
-    fn coarsest(&self, demand: &Demand) -> f64 {
-        demand.sides[0].max(demand.sides[1]) / self.min_side
+        (sums, border)
     }
 
     /// Error and texels, as if they were one.
     fn cost(&self, demand: &Demand) -> f64 {
-        let texel = demand.texel(&self.budget).min(self.coarsest(demand));
+        let texel = demand
+            .texel(&self.budget)
+            .min(coarsest(demand, self.params));
         let cost =
             demand.error(texel) + self.budget.worth * demand.texels(texel, self.budget.margin);
         // A patch without extent has no texel.
@@ -317,10 +313,14 @@ impl<'a> Divider<'a> {
         let stamp = self.sets.mark(faces);
         let beside = |sets: &Sets, f: FaceId| {
             c.face_halfedges(f).map(|h| {
-                let g = slit.across(h).map(|t| c.face(t));
-                g.filter(|&g| sets.has(g, stamp)).map(|g| (g, c.edge(h)))
+                let g = slit.beside(h).filter(|&g| sets.has(g, stamp));
+                g.map(|g| (g, c.edge(h)))
             })
         };
+        let has_crease = |f| c.face_edges(f).into_iter().any(|e| self.bends.is_crease[e]);
+        if !faces.iter().any(|&f| has_crease(f)) {
+            return Vec::new();
+        }
         let mut parts: Vec<(Vec<FaceId>, f64)> = Vec::new();
         faces.iter().for_each(|&f| self.label[f] = NONE);
         for &first in faces {
@@ -334,7 +334,7 @@ impl<'a> Divider<'a> {
                 next += 1;
                 area += slit.source_area[f];
                 for (g, e) in beside(&self.sets, f).into_iter().flatten() {
-                    if !self.is_crease[e] && self.label[g] == NONE {
+                    if !self.bends.is_crease[e] && self.label[g] == NONE {
                         self.label[g] = 0;
                         part.push(g);
                     }
@@ -376,13 +376,15 @@ impl<'a> Divider<'a> {
         &mut self,
         faces: &[FaceId],
         placement: &Placement,
-        angle: f64,
+        outline: &Outline,
     ) -> Vec<Vec<Vec<FaceId>>> {
         let slit = self.slit;
+        let triangles = faces.iter().map(|&f| placement.triangle(slit, f));
+        let triangles: Vec<Triangle> = triangles.collect();
         let mut promised: Vec<(i64, usize, usize)> = Vec::new();
         let mut strips: Vec<Vec<u8>> = Vec::new();
         for direction in 0..DIRECTIONS {
-            let angle = angle + std::f64::consts::PI * direction as f64 / DIRECTIONS as f64;
+            let angle = outline.angle + std::f64::consts::PI * direction as f64 / DIRECTIONS as f64;
             let axis = [angle.cos(), angle.sin()];
             let along = |p: [f64; 2]| {
                 [
@@ -391,18 +393,20 @@ impl<'a> Divider<'a> {
                 ]
             };
             let mut range = Extent::default();
-            for copy in faces.iter().flat_map(|&f| slit.copies(f)) {
-                range.add(along(placement.positions[copy]));
-            }
+            outline
+                .border
+                .iter()
+                .flatten()
+                .for_each(|&p| range.add(along(p)));
             let (low, length) = (range.low[0], range.high[0] - range.low[0]);
             let mut strip = Vec::with_capacity(faces.len());
             let mut rows = vec![(Sums::default(), Extent::default()); LINES + 1];
-            for &f in faces {
-                let t = placement.triangle(slit, f).map(along);
+            for (&f, t) in faces.iter().zip(&triangles) {
+                let t = t.map(along);
                 let at = (centroid(&t)[0] - low) / length.max(f64::MIN_POSITIVE);
                 let at = (at * (LINES as f64 + OFFSET)).clamp(0.0, LINES as f64) as usize;
                 strip.push(at as u8);
-                rows[at].0 = rows[at].0.and(self.faces[f]);
+                rows[at].0 = rows[at].0.and(self.bends.of_face[f]);
                 t.into_iter().for_each(|p| rows[at].1.add(p));
             }
             let below = self.running(rows.iter());
@@ -428,6 +432,23 @@ impl<'a> Divider<'a> {
         sides.collect()
     }
 
+    /// Connected parts of less scale and of more: a texel is of one width in the plane, so where scale is least the surface is held worst.
+    fn by_scale(&mut self, faces: &[FaceId]) -> Vec<Vec<Vec<FaceId>>> {
+        let slit = self.slit;
+        let scales = faces.iter().map(|&f| slit.log_scale[f]);
+        let lowest = scales.fold(f64::INFINITY, f64::min);
+        let range = highest(slit, faces) - lowest;
+        let steps = (range / SCALE_STEP).ceil().min(64.0) as usize;
+        let thresholds = (1..steps).map(|i| lowest + range * i as f64 / steps as f64);
+        let thresholds: Vec<f64> = thresholds.collect();
+        let sides = thresholds.into_iter().map(|most| {
+            let is_below = faces.iter().map(|&f| slit.log_scale[f] <= most);
+            let is_below: Vec<bool> = is_below.collect();
+            self.without_crumbs(faces, &is_below)
+        });
+        sides.collect()
+    }
+
     /// Cost of the rows so far, for every number of rows.
     fn running<'r>(&self, rows: impl Iterator<Item = &'r (Sums, Extent)>) -> Vec<f64> {
         let (mut sums, mut extent) = (Sums::default(), Extent::default());
@@ -441,46 +462,65 @@ impl<'a> Divider<'a> {
         .collect()
     }
 
-    /// Faces on the two sides, small pieces on the side that surrounds them.
+    /// Connected parts of the two sides, small pieces in the side that surrounds them.
     fn without_crumbs(&mut self, faces: &[FaceId], is_below: &[bool]) -> Vec<Vec<FaceId>> {
-        let slit = self.slit;
-        let area = |part: &[FaceId]| part.iter().map(|&f| slit.source_area[f]).sum::<f64>();
-        let least = CRUMB * area(faces);
-        let mut sides = [Vec::new(), Vec::new()];
+        // Few texels hold a small piece, unless it bends most.
+        let weights = |part: &[FaceId]| {
+            let sums = part.iter().map(|&f| self.bends.of_face[f]);
+            let sums = sums.fold(Sums::default(), Sums::and);
+            [sums.area, sums.bend[1]]
+        };
+        let least = weights(faces).map(|weight| CRUMB * weight);
+        let mut sides: [Vec<Vec<FaceId>>; 2] = Default::default();
+        let mut is_whole = true;
         for side in [false, true] {
             let own = faces.iter().zip(is_below).filter(|row| *row.1 == side);
             let own: Vec<FaceId> = own.map(|row| *row.0).collect();
             for component in self.sets.components(&own) {
-                let to = side != (area(&component) < least);
-                sides[usize::from(to)].extend(component);
+                let own = weights(&component);
+                let is_small = own[0] < least[0] && own[1] <= least[1];
+                is_whole &= !is_small;
+                sides[usize::from(side != is_small)].push(component);
             }
         }
-        sides.into()
+        let parts = sides.into_iter().flat_map(|side| {
+            if is_whole {
+                side
+            } else {
+                self.sets.components(&side.concat())
+            }
+        });
+        parts.collect()
     }
 }
 
-/// Areas of a face, and the bend of those of its edges that count.
-fn of_face(
-    slit: &Slit,
-    bends: &EdgeVec<[f64; 2]>,
-    f: FaceId,
-    counts: impl Fn(&HalfedgeId) -> bool,
-) -> Sums {
-    let shrunk = (-slit.log_scale[f]).exp();
-    let mut bend = [0.0; 2];
-    for h in slit.connectivity.face_halfedges(f) {
-        if counts(&h) {
-            // Half of it belongs to the face on the other side.
-            let [crease, bent] = bends[slit.connectivity.edge(h)];
-            bend[0] += 0.5 * crease * shrunk.powi(3);
-            bend[1] += 0.5 * bent * shrunk.powi(4);
+/// What a patch asks for, and where its rectangle lies.
+struct Outline {
+    demand: Demand,
+    /// Direction of the rectangle's longer side.
+    angle: f64,
+    /// The faces that have a side on the border.
+    border: Vec<Triangle>,
+}
+
+impl Outline {
+    fn new(slit: &Slit, sums: Sums, border: &[FaceId], placement: &Placement) -> Self {
+        let border = border.iter().map(|&f| placement.triangle(slit, f));
+        let border: Vec<Triangle> = border.collect();
+        let rectangle = smallest(&border);
+        let sides = [rectangle.width, rectangle.width * rectangle.height];
+        Self {
+            demand: Demand { sums, sides },
+            angle: wrap_angle(rectangle.angle),
+            border,
         }
     }
-    Sums {
-        area: slit.source_area[f],
-        flat: slit.flat_area[f],
-        bend,
-    }
+}
+
+/// Greatest log scale of some faces.
+fn highest(slit: &Slit, faces: &[FaceId]) -> f64 {
+    let scales = faces.iter().map(|&f| slit.log_scale[f]);
+    scales.fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Least and greatest coordinates.
@@ -507,84 +547,4 @@ impl Extent {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::samples::{Sample, ramp, strip};
-    use super::super::{Domain, PatchLayout, PatchParams, layout};
-    use crate::atlas::geometry_image::{image_origin, sample};
-    use crate::geometry::deviation::{Sampling, Triangles, deviation};
-    use crate::rebuild::{Images, rebuild};
-    use std::collections::BTreeSet;
-
-    fn laid_out(s: &Sample, domain: Domain) -> PatchLayout {
-        let params = PatchParams {
-            texel_budget: 64 * 64,
-            min_side: 8,
-            ..PatchParams::default()
-        };
-        let development = &s.development;
-        layout(
-            &s.mesh,
-            &s.length,
-            &s.cut,
-            development,
-            None,
-            domain,
-            &params,
-        )
-        .unwrap()
-    }
-
-    #[test]
-    fn patches_meet_along_a_crease() {
-        let s = strip(
-            24,
-            10,
-            |s, t| [(s - 0.5).abs(), t, s],
-            |s, t| [std::f64::consts::SQRT_2 * s, t],
-            [0.0; 2],
-        );
-        let layout = laid_out(&s, Domain::Flat);
-        let side = |f| s.mesh.face_positions(f).iter().all(|p| p[2] <= 0.5 + 1e-9);
-        let patches = s.mesh.connectivity.faces();
-        let pairs: BTreeSet<_> = patches.map(|f| (side(f), layout.face_patch[f])).collect();
-        assert_eq!(layout.patches.len(), 2);
-        assert_eq!(pairs.len(), 2, "{pairs:?}");
-        assert_eq!(laid_out(&s, Domain::Rectangle).patches.len(), 1);
-    }
-
-    /// What is promised, against the error of the mesh that is made of the images.
-    #[test]
-    fn parts_hold_the_surface_better_with_as_many_texels() {
-        let mut bumpy = ramp(60, 40, 1.8);
-        for v in bumpy.mesh.connectivity.vertices() {
-            let p: &mut [f64; 3] = &mut bumpy.mesh.positions[v];
-            p[2] = 0.05 * (9.0 * p[0]).sin() * (8.0 * p[1]).cos();
-        }
-        let measure = |domain| {
-            let layout = laid_out(&bumpy, domain);
-            let origin = image_origin(&bumpy.mesh);
-            let images = sample(&bumpy.mesh, &layout, &bumpy.log_scale, origin);
-            let texels: usize = images.iter().map(|i| i.width * i.height).sum();
-            let made = rebuild(&Images::new(&layout, &images, origin)).unwrap();
-            let faces = bumpy.mesh.connectivity.to_faces();
-            let given = Triangles {
-                positions: bumpy.mesh.positions.as_slice(),
-                faces: &faces,
-            };
-            let made = Triangles {
-                positions: &made.positions,
-                faces: &made.faces,
-            };
-            let sampling = Sampling {
-                samples: 20_000,
-                vertices: 0,
-            };
-            let found = deviation(given, made, sampling).unwrap();
-            (layout.patches.len(), texels as f64, found.rms)
-        };
-        let (one, two) = (measure(Domain::Rectangle), measure(Domain::Flat));
-        assert!(one.0 < two.0, "{one:?} {two:?}");
-        assert!(two.1 <= 1.05 * one.1, "{one:?} {two:?}");
-        assert!(two.2 < 0.8 * one.2, "{one:?} {two:?}");
-    }
-}
+mod tests;

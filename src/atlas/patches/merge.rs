@@ -8,10 +8,28 @@ use rustc_hash::FxHashSet as Set;
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
 
-struct Part {
-    faces: Vec<FaceId>,
-    log_scale: [f64; 2],
+/// A patch as its neighbours see it.
+pub(super) struct Part {
+    pub faces: Vec<FaceId>,
+    /// Least and greatest.
+    pub log_scale: [f64; 2],
     area: f64,
+}
+
+impl Part {
+    pub fn new(slit: &Slit, faces: Vec<FaceId>) -> Self {
+        let mut part = Self {
+            log_scale: [f64::INFINITY, f64::NEG_INFINITY],
+            area: 0.0,
+            faces,
+        };
+        for &f in &part.faces {
+            let s = slit.log_scale[f];
+            part.log_scale = [part.log_scale[0].min(s), part.log_scale[1].max(s)];
+            part.area += slit.source_area[f];
+        }
+        part
+    }
 }
 
 /// Rounds over all patches: a merge can make another one possible, hardly ever twice.
@@ -29,18 +47,8 @@ pub(super) fn merge(
         .into_iter()
         .enumerate()
         .map(|(i, faces)| {
-            let mut part = Part {
-                log_scale: [f64::INFINITY, f64::NEG_INFINITY],
-                area: 0.0,
-                faces,
-            };
-            for &f in &part.faces {
-                label[f] = i as u32;
-                let s = slit.log_scale[f];
-                part.log_scale = [part.log_scale[0].min(s), part.log_scale[1].max(s)];
-                part.area += slit.source_area[f];
-            }
-            part
+            faces.iter().for_each(|&f| label[f] = i as u32);
+            Part::new(slit, faces)
         })
         .collect();
     let unit: f64 = parts.iter().map(|p| p.area).sum();
@@ -65,7 +73,7 @@ pub(super) fn merge(
                     return false;
                 }
                 let (a, b) = (&parts[small as usize], &parts[other as usize]);
-                let fits = within(a, b, range) && joins_to_a_disk(slit, a, &label, other);
+                let fits = within(a, b, range) && joins_to_a_disk(slit, a, &label, [small, other]);
                 if !fits {
                     return false;
                 }
@@ -108,25 +116,36 @@ pub(super) fn merge(
     faces.filter(|f| !f.is_empty()).collect()
 }
 
-fn within(a: &Part, b: &Part, range: f64) -> bool {
+/// True where two patches together stay within the range of log scale.
+pub(super) fn within(a: &Part, b: &Part, range: f64) -> bool {
     let high = a.log_scale[1].max(b.log_scale[1]);
     let low = a.log_scale[0].min(b.log_scale[0]);
     high - low <= range
 }
 
-/// True where a disk and the disk labelled `other` share one path: then their union is a disk.
+/// True where a disk and another share one path, by their labels: then their union is a disk.
 /// Both are pieces of one disk, so what they share is a forest, and vertices − edges counts its trees.
-fn joins_to_a_disk(slit: &Slit, part: &Part, label: &FaceVec<u32>, other: u32) -> bool {
+pub(super) fn joins_to_a_disk(
+    slit: &Slit,
+    part: &Part,
+    label: &FaceVec<u32>,
+    labels: [u32; 2],
+) -> bool {
     let c = slit.connectivity;
+    let [own, other] = labels;
     let mut copies = Set::default();
     let (mut vertices, mut edges) = (0, 0);
     for &f in &part.faces {
-        for h in c.face_halfedges(f) {
-            if let Some(t) = slit.across(h) {
-                edges += usize::from(label[c.face(t)] == other);
-            }
+        let halfedges = c.face_halfedges(f);
+        let beside = halfedges.map(|h| slit.beside(h).map(|n| label[n]));
+        if beside == [Some(own); 3] {
+            continue;
+        }
+        for (k, h) in halfedges.into_iter().enumerate() {
+            edges += usize::from(beside[k] == Some(other));
             // A corner whose both sides lie inside the part is looked at from another one of the copy's.
-            if copies.insert(slit.development.copy[h]) {
+            let is_inside = beside[k] == Some(own) && beside[(k + 2) % 3] == Some(own);
+            if !is_inside && copies.insert(slit.development.copy[h]) {
                 vertices += usize::from(around(slit, h).any(|f| label[f] == other));
             }
         }
@@ -150,7 +169,8 @@ pub(super) fn around<'a>(slit: &'a Slit, start: HalfedgeId) -> impl Iterator<Ite
     turn(true).chain(turn(false)).map(move |h| c.face(h))
 }
 
-fn overlaps(
+/// True where two patches, by their labels, overlap.
+pub(super) fn overlaps(
     slit: &Slit,
     a: &Part,
     b: &Part,

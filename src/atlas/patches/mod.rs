@@ -15,6 +15,7 @@
 //! The tutorial has no patches: it shows one chart that overlaps itself (Fig. 19d). A geometry image needs
 //! a domain that does not.
 
+mod bend;
 mod demand;
 mod dissolve;
 mod divide;
@@ -40,8 +41,9 @@ use crate::atlas::overlay::Layout;
 use crate::atlas::plane::Similarity;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, PatchId};
 use crate::geometry::mesh::Mesh;
+pub(crate) use bend::edge_bends;
 use demand::Sums;
-pub(crate) use divide::bends;
+use divide::Divider;
 pub use given::charts_of;
 use rectangle::Oriented;
 pub(crate) use seams::seams;
@@ -161,7 +163,7 @@ pub struct PatchParams {
     pub log_scale_range: f64,
     /// Texels of all images of a component together (about).
     pub texel_budget: usize,
-    /// Least texels on the longer side of an image. Beyond that a patch keeps some texels on its shorter side and inside,
+    /// Least texels on the longer side of an image. Beyond that a patch keeps half as many, and at most 8, on its shorter side, and some inside,
     /// so that a budget too small for all patches together is exceeded.
     pub min_side: usize,
     /// Texels between patches in the packed square, and around each image.
@@ -273,21 +275,29 @@ pub fn layout(
         }
     }
     let slit = Slit::new(mesh, length, cut, development, under);
-    let sets = segment_into(&slit, params);
+    let (sets, range) = segment_into(&slit, domain, params);
     let mut own = vec![[0.0; 2]; development.copies];
-    let sets = divide::divide(&slit, sets, domain, params, &mut own);
+    let mut divider = Divider::new(&slit, params);
+    let sets = match domain {
+        Domain::Flat => divider.divide(sets, range, &mut own),
+        // All else is decided where lines may cross faces.
+        Domain::Rectangle => divider.divide_along_creases(sets, &mut own),
+    };
     let mut face_patch = FaceVec::filled(PatchId::new(0), c.face_count());
     let mut uv = FaceVec::filled([[0.0; 2]; 3], c.face_count());
+    for (i, faces) in sets.iter().enumerate() {
+        faces.iter().for_each(|&f| face_patch[f] = PatchId::new(i));
+    }
     let mut oriented = Vec::with_capacity(sets.len());
     for (i, faces) in sets.iter().enumerate() {
-        let patch = rectangle::orient(&slit, faces, &mut own);
+        let member = |f: FaceId| face_patch[f].index() == i;
+        let patch = rectangle::orient(&slit, faces, member, &mut own);
         for (&f, &corners) in faces.iter().zip(&patch.uv) {
-            face_patch[f] = PatchId::new(i);
             uv[f] = corners;
         }
         oriented.push(patch);
     }
-    let sums = divide::sums(&slit, &sets, params);
+    let sums: Vec<Sums> = sets.iter().map(|faces| divider.sums(faces)).collect();
     let (patches, packed) = with_images(&oriented, &sums, params);
     let seams = seams(mesh, &cut.is_cut, &face_patch, &uv);
     Ok(PatchLayout {
@@ -342,18 +352,18 @@ fn with_images(
     (patches, packed)
 }
 
-/// The patches' faces: at most `max_count`, as far as the range of scale decides about that.
-fn segment_into(slit: &Slit, params: &PatchParams) -> Vec<Vec<FaceId>> {
+/// The patches' faces: at most `max_count`, as far as the range of scale decides about that; and that range.
+fn segment_into(slit: &Slit, domain: Domain, params: &PatchParams) -> (Vec<Vec<FaceId>>, f64) {
     let mut range = params.log_scale_range;
-    let mut sets = segment::segment(slit, range);
+    let mut sets = segment::segment(slit, range, domain);
     while params.max_count.is_some_and(|most| sets.len() > most) && range < WIDEST_RANGE {
         range = (2.0 * range).min(WIDEST_RANGE);
-        let fewer = segment::segment(slit, range);
+        let fewer = segment::segment(slit, range, domain);
         if fewer.len() < sets.len() {
             sets = fewer;
         }
     }
-    sets
+    (sets, range)
 }
 
 /// Rasters with their boxes in the packed square, and its side, in texels; corners count from the lower left.

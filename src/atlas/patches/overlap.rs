@@ -15,6 +15,10 @@ const END: u32 = u32::MAX;
 /// A cell of the grid: level, column and row. A cell of level k measures 2^k.
 type Cell = (i32, i64, i64);
 
+/// Cells are stored in blocks of 8 by 8 of them: what is near in the plane is near in memory, and found at once.
+const BLOCK: u32 = 3;
+const BLOCK_CELLS: usize = 1 << (2 * BLOCK);
+
 /// What lies in a cell.
 #[derive(Clone, Copy)]
 struct Content {
@@ -29,13 +33,26 @@ const EMPTY: Content = Content {
     is_parent: false,
 };
 
+/// The block of a cell.
+fn block_of((level, x, y): Cell) -> Cell {
+    (level, x >> BLOCK, y >> BLOCK)
+}
+
+/// The place of a cell in its block.
+fn place_in_block((_, x, y): Cell) -> usize {
+    let low = (1 << BLOCK) - 1;
+    ((x & low) << BLOCK | y & low) as usize
+}
+
 /// The triangles of a patch so far, found by place.
 ///
 /// A triangle is kept in the cells of its own size. Larger ones are found by going up from there, smaller ones by going
 /// down into the quarters that hold anything.
 pub(super) struct TriangleIndex {
     triangles: Vec<Triangle>,
-    cells: Map<Cell, Content>,
+    /// Blocks that hold anything: where their cells begin.
+    blocks: Map<Cell, usize>,
+    cells: Vec<Content>,
     /// Linked lists: triangle and next node.
     nodes: Vec<(u32, u32)>,
     /// Least and greatest level of any triangle that will come.
@@ -57,7 +74,8 @@ impl TriangleIndex {
         let least = level(sizes[0]).clamp(largest - DEPTH as i32, largest);
         TriangleIndex {
             triangles: Vec::new(),
-            cells: Map::default(),
+            blocks: Map::default(),
+            cells: Vec::new(),
             nodes: Vec::new(),
             levels: [least, largest],
             used: [false; DEPTH + 1],
@@ -69,6 +87,33 @@ impl TriangleIndex {
         level(size(t)).clamp(self.levels[0], self.levels[1])
     }
 
+    /// Where the cells of a cell's block begin; `last` is the block that was asked for before.
+    fn block(&self, cell: Cell, last: &mut (Cell, Option<usize>)) -> Option<usize> {
+        let block = block_of(cell);
+        if last.0 != block {
+            *last = (block, self.blocks.get(&block).copied());
+        }
+        last.1
+    }
+
+    /// What lies in a cell.
+    fn content(&self, cell: Cell, last: &mut (Cell, Option<usize>)) -> Content {
+        let first = self.block(cell, last);
+        let content = first.and_then(|first| self.cells.get(first + place_in_block(cell)));
+        content.copied().unwrap_or(EMPTY)
+    }
+
+    /// The number of a cell, which gets a place if it has none.
+    fn number(&mut self, cell: Cell) -> usize {
+        let cells = &mut self.cells;
+        let first = *self.blocks.entry(block_of(cell)).or_insert_with(|| {
+            let first = cells.len();
+            cells.resize(first + BLOCK_CELLS, EMPTY);
+            first
+        });
+        first + place_in_block(cell)
+    }
+
     /// Adds a triangle.
     pub fn insert(&mut self, t: Triangle) {
         let id = self.triangles.len() as u32;
@@ -76,7 +121,8 @@ impl TriangleIndex {
         self.used[(own - self.levels[0]) as usize] = true;
         self.triangles.push(t);
         for (x, y) in cells(&t, own) {
-            let content = self.cells.entry((own, x, y)).or_insert(EMPTY);
+            let number = self.number((own, x, y));
+            let content = &mut self.cells[number];
             let is_new = content.own == END && !content.is_parent;
             self.nodes.push((id, content.own));
             content.own = (self.nodes.len() - 1) as u32;
@@ -85,7 +131,8 @@ impl TriangleIndex {
             while go_on && at.0 < self.levels[1] {
                 // Shifts round down, as cells do.
                 at = (at.0 + 1, at.1 >> 1, at.2 >> 1);
-                let parent = self.cells.entry(at).or_insert(EMPTY);
+                let number = self.number(at);
+                let parent = &mut self.cells[number];
                 go_on = parent.own == END && !parent.is_parent;
                 parent.is_parent = true;
             }
@@ -102,10 +149,10 @@ impl TriangleIndex {
         let own = self.level_of(t);
         let larger = |k: &i32| self.used[(k - self.levels[0]) as usize];
         let mut below: Vec<Cell> = Vec::new();
+        // No cell has this level.
+        let mut last = ((i32::MAX, 0, 0), None);
         for (x, y) in cells(t, own) {
-            let Some(content) = self.cells.get(&(own, x, y)) else {
-                continue;
-            };
+            let content = self.content((own, x, y), &mut last);
             if self.meets_list(t, content.own, tolerance) {
                 return true;
             }
@@ -115,8 +162,8 @@ impl TriangleIndex {
         }
         if (own + 1..=self.levels[1]).filter(larger).any(|k| {
             cells(t, k).any(|(x, y)| {
-                let content = self.cells.get(&(k, x, y));
-                content.is_some_and(|content| self.meets_list(t, content.own, tolerance))
+                let content = self.content((k, x, y), &mut last);
+                self.meets_list(t, content.own, tolerance)
             })
         }) {
             return true;
@@ -127,9 +174,7 @@ impl TriangleIndex {
                 if !(xs.contains(&x) && ys.contains(&y)) {
                     continue;
                 }
-                let Some(content) = self.cells.get(&(k - 1, x, y)) else {
-                    continue;
-                };
+                let content = self.content((k - 1, x, y), &mut last);
                 if self.meets_list(t, content.own, tolerance) {
                     return true;
                 }
@@ -169,8 +214,10 @@ fn bounds(t: &Triangle) -> ([f64; 2], [f64; 2]) {
 }
 
 fn level(size: f64) -> i32 {
-    // Zero has no logarithm; nothing is smaller than the least normal number.
-    size.max(f64::MIN_POSITIVE).log2().ceil() as i32
+    // Zero has no logarithm; nothing is smaller than the least normal number. The exponent is what the logarithm rounds down to.
+    let bits = size.clamp(f64::MIN_POSITIVE, f64::MAX).to_bits();
+    let exponent = (bits >> 52) as i32 - 1023;
+    exponent + i32::from(bits << 12 != 0)
 }
 
 fn cells(t: &Triangle, level: i32) -> impl Iterator<Item = (i64, i64)> + use<> {
@@ -181,7 +228,8 @@ fn cells(t: &Triangle, level: i32) -> impl Iterator<Item = (i64, i64)> + use<> {
 /// Columns and rows of the cells that a triangle's bounding box touches.
 fn cell_range(t: &Triangle, level: i32) -> [std::ops::RangeInclusive<i64>; 2] {
     // A power of two: dividing by it and multiplying by its inverse are the same.
-    let per_unit = f64::from(-level).exp2();
+    let exponent = (1023 - i64::from(level)).clamp(1, 2046);
+    let per_unit = f64::from_bits((exponent as u64) << 52);
     let (low, high) = bounds(t);
     let at = |x: f64| floor(x * per_unit);
     [0, 1].map(|i| at(low[i])..=at(high[i]))

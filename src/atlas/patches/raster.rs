@@ -20,22 +20,38 @@ pub(crate) fn cover(
         return;
     }
     let sign = doubled.signum();
-    let range = |i: usize, count: usize| {
-        let low = triangle.iter().map(|p| p[i]).fold(f64::INFINITY, f64::min);
-        let high = triangle
-            .iter()
-            .map(|p| p[i])
-            .fold(f64::NEG_INFINITY, f64::max);
-        // Casts saturate; one texel more on each side costs nothing, the predicate decides.
-        let first = (low - 0.5).floor().max(0.0) as usize;
-        let last = ((high - 0.5).ceil().max(-1.0) + 1.0) as usize;
+    // Casts saturate, and what lies between the bounds is decided by the predicate.
+    let range = |low: f64, high: f64, count: usize| {
+        let first = (low - 0.5).ceil().max(0.0) as usize;
+        let last = ((high - 0.5).floor().max(-1.0) + 1.0) as usize;
         first..last.min(count)
     };
-    for row in range(1, height) {
-        for column in range(0, width) {
+    let [low, high] = [f64::min, f64::max]
+        .map(|f| [0, 1].map(|i| f(f(triangle[0][i], triangle[1][i]), triangle[2][i])));
+    // Far more than rounding moves where a row meets a side, far less than a texel.
+    let slack = 1e-6 + 1e-12 * (low[0].abs() + high[0].abs());
+    for row in range(low[1], high[1], height) {
+        let y = row as f64 + 0.5;
+        let mut span = [f64::INFINITY, f64::NEG_INFINITY];
+        for (p, q) in [(a, b), (b, c), (c, a)] {
+            if y < p.y.min(q.y) || y > p.y.max(q.y) {
+                continue;
+            }
+            // A side along the row meets it at both ends.
+            let along = (y - p.y) / (q.y - p.y);
+            let ends = if p.y == q.y {
+                [p.x, q.x]
+            } else {
+                [p.x + along * (q.x - p.x); 2]
+            };
+            for x in ends {
+                span = [span[0].min(x), span[1].max(x)];
+            }
+        }
+        for column in range(span[0] - slack, span[1] + slack, width) {
             let p = Coord {
                 x: column as f64 + 0.5,
-                y: row as f64 + 0.5,
+                y,
             };
             let w = [orient2d(b, c, p), orient2d(c, a, p), orient2d(a, b, p)].map(|w| sign * w);
             let sum = w[0] + w[1] + w[2];

@@ -27,8 +27,13 @@ pub(super) struct Oriented {
     pub to_chart: Similarity,
 }
 
-/// Coordinates of a patch; `own` is scratch space, a place a copy.
-pub(super) fn orient(slit: &Slit, faces: &[FaceId], own: &mut [[f64; 2]]) -> Oriented {
+/// Coordinates of a patch, which is what `member` accepts; `own` is scratch space, a place a copy.
+pub(super) fn orient(
+    slit: &Slit,
+    faces: &[FaceId],
+    member: impl Fn(FaceId) -> bool,
+    own: &mut [[f64; 2]],
+) -> Oriented {
     let highest = faces.iter().map(|&f| slit.log_scale[f]);
     let highest = highest.fold(f64::NEG_INFINITY, f64::max);
     // The largest face of all is the best conditioned one to start from.
@@ -38,9 +43,7 @@ pub(super) fn orient(slit: &Slit, faces: &[FaceId], own: &mut [[f64; 2]]) -> Ori
         .copied()
         .max_by_key(|&f| (area_bits(f), std::cmp::Reverse(f)))
         .unwrap_or(FaceId::new(0));
-    let set: rustc_hash::FxHashSet<FaceId> = faces.iter().copied().collect();
-    let member = |f: FaceId| set.contains(&f);
-    let placement = place(slit, faces.iter().copied(), root, highest, member, own);
+    let placement = place(slit, faces.iter().copied(), root, highest, &member, own);
     let mut frame = Frame::new(slit, faces, &placement, slit.is_deep(highest));
     if !frame.own {
         let error = slit.length_error(faces, placement.positions);
@@ -84,26 +87,54 @@ impl Frame {
 
 /// Triangles of a given total area in the coordinates of their smallest rectangle; `to_chart` leads back.
 pub(super) fn in_rectangle(corners: &[[[f64; 2]; 3]], area: f64) -> Oriented {
-    let points = || corners.iter().flatten().copied();
-    let angle = best_angle(&convex_hull(outer(points)));
+    let Smallest {
+        angle,
+        low,
+        width,
+        height,
+    } = smallest(corners);
     let turned = rotation(-angle);
-    let (low, high) = extents(points().map(&turned));
-    let width = high[0] - low[0];
-    // A patch without any extent keeps its coordinates.
-    let width = if width > 0.0 { width } else { 1.0 };
     let to_patch = |p: [f64; 2]| {
         let q = turned(p);
         [(q[0] - low[0]) / width, (q[1] - low[1]) / width]
     };
     Oriented {
         uv: corners.iter().map(|t| t.map(to_patch)).collect(),
-        height: (high[1] - low[1]) / width,
+        height,
         area: area / (width * width),
         to_chart: Similarity {
             scale: width,
             rotation: wrap_angle(angle),
             translation: rotate(low, angle),
         },
+    }
+}
+
+/// The smallest rectangle around triangles.
+pub(super) struct Smallest {
+    /// Of its longer side.
+    pub angle: f64,
+    /// Its lower left corner, turned by minus that.
+    pub low: [f64; 2],
+    /// Its longer side.
+    pub width: f64,
+    /// Its shorter side, as part of the longer one.
+    pub height: f64,
+}
+
+/// The smallest rectangle around triangles. Those on a patch's border have the same as all.
+pub(super) fn smallest(corners: &[[[f64; 2]; 3]]) -> Smallest {
+    let points = || corners.iter().flatten().copied();
+    let angle = best_angle(&convex_hull(outer(points)));
+    let (low, high) = extents(points().map(rotation(-angle)));
+    let width = high[0] - low[0];
+    // A patch without any extent keeps its coordinates.
+    let width = if width > 0.0 { width } else { 1.0 };
+    Smallest {
+        angle,
+        low,
+        width,
+        height: (high[1] - low[1]) / width,
     }
 }
 

@@ -6,14 +6,14 @@ use super::raster::{cover, to_texel};
 use super::rectangle::Oriented;
 use super::{MAX_SIDE, PatchParams};
 
-/// Least texels on the shorter side, where that does not make the longer one absurd.
+/// Least texels on the shorter side, where that does not make the longer one absurd …
 const MIN_SHORT_SIDE: f64 = 8.0;
+/// … or this part of what the longer side must have, where that is less: who asks for small images wants them narrow too.
+const MIN_SHORT_PART: f64 = 0.5;
 /// The shorter side asks for no more than this on the longer one.
 const ENOUGH_LONG_SIDE: f64 = 1024.0;
-/// Least texel areas inside a patch.
-const MIN_AREA: f64 = 64.0;
-/// Least texel centres inside a patch.
-const MIN_COVERED: usize = 24;
+/// Part of the texels in a square of the least shorter side whose centres a patch covers.
+const MIN_COVERED: f64 = 0.375;
 
 /// The raster of one patch.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,7 +33,7 @@ pub(super) struct Raster {
 /// Rasters of all patches; `sums` are their areas and bends.
 pub(super) fn rasters(patches: &[Oriented], sums: &[Sums], params: &PatchParams) -> Vec<Raster> {
     let margin = (params.padding as f64).max(0.5);
-    let most = (MAX_SIDE - 2 * params.padding.max(1)) as f64;
+    let most = densest(params);
     let demand = |(patch, sums): (&Oriented, &Sums)| {
         let width = patch.to_chart.scale;
         let sides = [width, width * patch.height];
@@ -42,9 +42,10 @@ pub(super) fn rasters(patches: &[Oriented], sums: &[Sums], params: &PatchParams)
     let demands: Vec<Demand> = patches.iter().zip(sums).map(demand).collect();
     let coarsest: Vec<f64> = patches
         .iter()
-        .map(|p| p.to_chart.scale / least_density(p, params, most))
+        .map(|p| p.to_chart.scale / least_density(p.height, p.area, params))
         .collect();
     let budget = demand::budget(&demands, &coarsest, params);
+    let least = least_covered(params);
     let texels = demands.iter().zip(&coarsest);
     let texels = texels.map(|(demand, &coarsest)| demand.texel(&budget).min(coarsest));
     patches
@@ -56,7 +57,7 @@ pub(super) fn rasters(patches: &[Oriented], sums: &[Sums], params: &PatchParams)
             let mut columns = (density.min(most) + 0.5).floor().max(1.0);
             loop {
                 let raster = isotropic(patch.height, columns, margin);
-                if covered(patch, &raster) >= MIN_COVERED {
+                if covered(patch, &raster, least) >= least {
                     return raster;
                 }
                 if columns >= most {
@@ -68,13 +69,37 @@ pub(super) fn rasters(patches: &[Oriented], sums: &[Sums], params: &PatchParams)
         .collect()
 }
 
-fn least_density(patch: &Oriented, params: &PatchParams, most: f64) -> f64 {
-    let short_side = MIN_SHORT_SIDE / patch.height.max(f64::MIN_POSITIVE);
-    let area = (MIN_AREA / patch.area.max(f64::MIN_POSITIVE)).sqrt();
+/// Most texels on the longer side of a patch.
+fn densest(params: &PatchParams) -> f64 {
+    (MAX_SIDE - 2 * params.padding.max(1)) as f64
+}
+
+/// Least texels on the shorter side.
+fn least_short(params: &PatchParams) -> f64 {
+    (MIN_SHORT_PART * params.min_side as f64).min(MIN_SHORT_SIDE)
+}
+
+/// Least texel centres inside a patch.
+fn least_covered(params: &PatchParams) -> usize {
+    (MIN_COVERED * least_short(params).powi(2)).ceil() as usize
+}
+
+/// Least texels on the longer side of a patch, of which its shorter side and its area are parts.
+fn least_density(height: f64, area: f64, params: &PatchParams) -> f64 {
+    let least = least_short(params);
+    let short_side = least / height.max(f64::MIN_POSITIVE);
+    let area = least / area.max(f64::MIN_POSITIVE).sqrt();
     (params.min_side as f64)
         .max(short_side.min(ENOUGH_LONG_SIDE))
         .max(area.min(ENOUGH_LONG_SIDE))
-        .min(most)
+        .min(densest(params))
+}
+
+/// The widest texel that the image of a patch may have.
+pub(super) fn coarsest(demand: &Demand, params: &PatchParams) -> f64 {
+    let [longer, shorter] = demand.sides;
+    let area = demand.sums.flat / (longer * longer);
+    longer / least_density(shorter / longer, area, params)
 }
 
 /// Square texels, `columns` of them on the patch's width; its height in the middle of the rows.
@@ -108,16 +133,16 @@ fn raster(height: f64, columns: f64, density: [f64; 2], rows: f64, margin: f64) 
 }
 
 /// Number of texel centres inside the patch, up to a little more than what is asked for.
-fn covered(patch: &Oriented, raster: &Raster) -> usize {
+fn covered(patch: &Oriented, raster: &Raster, least: usize) -> usize {
     let mut seen = std::collections::BTreeSet::new();
     for t in &patch.uv {
         let t = t.map(|p| to_texel(&raster.texel_to_patch, p));
         cover(t, raster.width, raster.height, |x, y, _| {
-            if seen.len() < MIN_COVERED {
+            if seen.len() < least {
                 seen.insert((x, y));
             }
         });
-        if seen.len() >= MIN_COVERED {
+        if seen.len() >= least {
             break;
         }
     }
@@ -182,6 +207,19 @@ mod tests {
     }
 
     #[test]
+    fn small_least_sides_hold_for_the_shorter_side_too() {
+        let columns = |min_side| {
+            let params = PatchParams {
+                texel_budget: 1,
+                min_side,
+                ..PatchParams::default()
+            };
+            rasters(&[rectangle(0.1)], &[even(1.0, 0.1)], &params)[0].density
+        };
+        assert_eq!([4, 8, 16, 32].map(columns), [20.0, 40.0, 80.0, 80.0]);
+    }
+
+    #[test]
     fn every_patch_lies_in_its_image_and_is_covered() {
         for padding in [0, 1, 5] {
             let params = PatchParams {
@@ -199,7 +237,7 @@ mod tests {
                     assert!(y >= margin && y <= r.height as f64 - margin, "{y} {r:?}");
                 }
                 assert!(r.width.max(r.height) <= MAX_SIDE);
-                assert!(height == 0.0 || covered(&patch, r) >= MIN_COVERED);
+                assert!(height == 0.0 || covered(&patch, r, 24) >= least_covered(&params));
             }
         }
     }

@@ -8,11 +8,12 @@
 //!    the largest hole, until there is none. (The sheet itself makes no holes: an immersed disk whose
 //!    border is a simple curve is embedded, so what a patch surrounds in the plane belongs to it.)
 //! 4. Merge neighbours while all three conditions hold, smallest first (`merge`); divide small patches
-//!    among their neighbours where none can take them whole, and let what is still tiny grow (`dissolve`).
+//!    among their neighbours where none can take them whole; what is still tiny and is to become rectangles grows (`dissolve`).
 //!
 //! Everything that is compared is rounded first and ties go to the lower id, so that a change in the
 //! last digits of the metric does not change the patches.
 
+use super::Domain;
 use super::dissolve::{dissolve, widen};
 use super::merge::merge;
 use super::overlap::{Triangle, TriangleIndex, size};
@@ -29,9 +30,9 @@ const GROWTH: f64 = 0.9;
 /// not do: a patch may be a thousandth of it, and what touches there overlaps in the patch.
 pub(super) const TOUCHING: f64 = 1e-10;
 
-/// Faces that overlap by no more than this part of the tolerance are clear of each other: parts of what was grown of such faces
-/// need no second look at their own, smaller extent unless it is smaller by as much.
-const CLEAR: f64 = 1e-2;
+/// Faces that overlap by no more than this part of the tolerance are clear of each other: parts of what they make need no second
+/// look at their own, smaller extent unless it is smaller by as much.
+pub(super) const CLEAR: f64 = 1e-2;
 
 /// Rounds of merging and dividing: each can make the other possible again, hardly ever often.
 const ROUNDS: usize = 3;
@@ -76,10 +77,15 @@ impl<'a> Placement<'a> {
 
     /// True where no two of these faces overlap.
     pub fn is_injective(&self, slit: &Slit, faces: &[FaceId]) -> bool {
+        self.is_injective_by(slit, faces, self.tolerance())
+    }
+
+    /// The same with a tolerance of its own.
+    pub fn is_injective_by(&self, slit: &Slit, faces: &[FaceId], tolerance: f64) -> bool {
         let mut index = self.index(slit, faces);
         faces.iter().all(|&f| {
             let triangle = self.triangle(slit, f);
-            let free = !index.overlaps(&triangle);
+            let free = !index.overlaps_by(&triangle, tolerance);
             index.insert(triangle);
             free
         })
@@ -117,7 +123,7 @@ pub(super) fn place<'a>(
 }
 
 /// Divides the slit disk; every face is in exactly one set. `range` bounds the regional log scale of each.
-pub(super) fn segment(slit: &Slit, range: f64) -> Vec<Vec<FaceId>> {
+pub(super) fn segment(slit: &Slit, range: f64, domain: Domain) -> Vec<Vec<FaceId>> {
     let mut sets = Sets::new(slit);
     let total: f64 = slit.source_area.iter().sum();
     let mut own = vec![[0.0; 2]; slit.development.copies];
@@ -172,7 +178,11 @@ pub(super) fn segment(slit: &Slit, range: f64) -> Vec<Vec<FaceId>> {
             break;
         }
     }
-    let mut patches = widen(slit, patches, range, &mut own);
+    // A small flat image costs less than the ragged border that a crumb leaves in its neighbours.
+    let mut patches = match domain {
+        Domain::Flat => patches,
+        Domain::Rectangle => widen(slit, patches, range, &mut own),
+    };
     for patch in &mut patches {
         patch.sort();
     }
@@ -544,8 +554,7 @@ fn halves(
     let mut cut = [0.0; DIRECTIONS];
     for &f in faces {
         for h in slit.connectivity.face_halfedges(f) {
-            let Some(t) = slit.across(h) else { continue };
-            let n = slit.connectivity.face(t);
+            let Some(n) = slit.beside(h) else { continue };
             // Hardly any two neighbours have a line between them.
             let between = sets.sides[f] & !sets.sides[n];
             if between != 0 && sets.stamp[n] == stamp {
@@ -577,8 +586,8 @@ pub(super) fn borders(
     let mut borders = BTreeMap::new();
     for &f in faces {
         for h in slit.connectivity.face_halfedges(f) {
-            if let Some(t) = slit.across(h) {
-                let other = label[slit.connectivity.face(t)];
+            if let Some(n) = slit.beside(h) {
+                let other = label[n];
                 if other != own {
                     *borders.entry(other).or_insert(0.0) += slit.source_length(h);
                 }

@@ -11,7 +11,7 @@ use crate::atlas::develop::{Development, Unfolded};
 use crate::atlas::overlay::Layout;
 use crate::atlas::plane;
 use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, HalfedgeId, HalfedgeVec, VertexVec};
+use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, HalfedgeId, HalfedgeVec, NONE, VertexVec};
 use crate::geometry::mesh::{Mesh, distance, triangle_area};
 use rustc_hash::{FxHashMap as Map, FxHashSet as Set};
 use std::cmp::Reverse;
@@ -36,6 +36,8 @@ pub(super) struct Slit<'a> {
     pub under: Option<(&'a Layout, &'a Unfolded)>,
     /// Flat length of every edge.
     pub length: &'a EdgeVec<f64>,
+    /// Face on the other side of every halfedge where the slit disk goes on there, else `NONE`: asked for far more often than anything else.
+    beside: HalfedgeVec<u32>,
     /// Central coordinates of every copy.
     pub central: Vec<[f64; 2]>,
     /// Area of every face in space.
@@ -83,7 +85,13 @@ impl<'a> Slit<'a> {
             .map(|f| flat_area(connectivity.face_edges(f).map(|e| length[e])))
             .collect();
         let log_scale = regional_log_scale(connectivity, &source_area, &flat_area);
+        let beside = connectivity.halfedges().map(|h| {
+            let twin = connectivity.twin(h);
+            let twin = twin.filter(|_| !cut.is_cut[connectivity.edge(h)]);
+            twin.map_or(NONE, |t| connectivity.face(t).raw())
+        });
         Slit {
+            beside: beside.collect(),
             connectivity,
             mesh,
             cut,
@@ -107,12 +115,17 @@ impl<'a> Slit<'a> {
     }
 
     /// The faces next to a face on the slit disk.
+    #[inline]
     pub fn neighbours(&self, f: FaceId) -> impl Iterator<Item = FaceId> + '_ {
-        self.connectivity
-            .face_halfedges(f)
-            .into_iter()
-            .filter_map(|h| self.across(h))
-            .map(|t| self.connectivity.face(t))
+        let sides = self.connectivity.face_halfedges(f);
+        sides.into_iter().filter_map(|h| self.beside(h))
+    }
+
+    /// The face on the other side of a halfedge, where the slit disk goes on there.
+    #[inline]
+    pub fn beside(&self, h: HalfedgeId) -> Option<FaceId> {
+        let f = self.beside[h];
+        (f != NONE).then(|| FaceId::new(f as usize))
     }
 
     /// The copies at the corners of a face.

@@ -252,9 +252,7 @@ pub(super) fn best_line(
     let many = sides > MOST_SIDES;
     let crowded = || {
         Ok::<_, RectangleError>(
-            disk.faces.len() >= LEAST_FACES
-                && visibility(drawing, disk, &nodes, &along)?
-                    < super::contract::envf("VIS", VISIBLE),
+            disk.faces.len() >= LEAST_FACES && visibility(drawing, disk, &nodes, &along)? < VISIBLE,
         )
     };
     if !many && !is_wanted && !crowded()? {

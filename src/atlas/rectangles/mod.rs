@@ -166,14 +166,11 @@ pub fn rectangles(
     contract::contract(&mut drawing)?;
     relax::relax(&mut drawing)?;
     division::divide(&mut drawing)?;
-    for _ in 0..contract::envf("AGAIN", 1.0) as usize {
-        sizes::divide(&mut drawing, params.texel_budget)?;
-        contract::contract(&mut drawing)?;
-        relax::relax(&mut drawing)?;
-    }
-    if std::env::var("LASTDIV").is_ok() {
-        division::divide(&mut drawing)?;
-    }
+    sizes::divide(&mut drawing, params.texel_budget)?;
+    contract::contract(&mut drawing)?;
+    relax::relax(&mut drawing)?;
+    // What has moved may be crowded elsewhere.
+    division::divide(&mut drawing)?;
     drawing.mark_middles();
     let quads = quads::quads(&mut drawing)?;
     let strips = Strips::new(&drawing.fine, &quads);

@@ -19,6 +19,8 @@ use crate::atlas::plane::{distance, doubled_area};
 use crate::geometry::ids::{HalfedgeId, VertexId, VertexVec};
 use crate::geometry::mesh::{cross, norm, sub};
 
+/// How often the weights follow the stretch, at most.
+const SPREADS: usize = 6;
 /// Stretches that differ by more from the mean say nothing.
 const MOST_STRETCHED: f64 = 8.0;
 
@@ -54,7 +56,7 @@ pub(super) fn place(
     let given = [0, 1].map(|i| given.iter().map(|p| p[i]).collect::<Vec<f64>>());
     let mut weight = weights(flat, &rectangle.layout.length);
     let mut best: Option<(f64, VertexVec<Option<[f64; 2]>>)> = None;
-    for _ in 0..=spread_rounds() {
+    for _ in 0..=SPREADS {
         let solved = with_weights(flat, &weight, border, &given)?;
         let mut at = at.clone();
         let most = [1.0, rectangle.height];
@@ -166,10 +168,6 @@ fn squared_stretch(p: [[f64; 3]; 3], uv: [[f64; 2]; 3]) -> f64 {
         })
     };
     0.5 * (norm(along(0)).powi(2) + norm(along(1)).powi(2))
-}
-
-fn spread_rounds() -> usize {
-    super::contract::envf("SPREAD", 4.0) as usize
 }
 
 /// Whether a face is turned over by more than the rounding of its corners, which lie in the unit square.

@@ -8,7 +8,7 @@
 
 use super::RectangleError;
 use super::subdivision::Subdivision;
-use crate::atlas::patches::bends;
+use crate::atlas::patches::edge_bends;
 use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, FaceVec, PatchId, VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
 use crate::geometry::triangle::area;
@@ -126,7 +126,7 @@ impl Drawing {
         let lengths = |f| c.face_edges(f).map(|e| mesh.edge_length(e));
         let areas = c.faces().map(|f| area(lengths(f)).unwrap_or(0.0));
         let areas: FaceVec<f64> = areas.collect();
-        let (bend, _) = bends(mesh, &areas, |h| c.twin(h));
+        let (bend, _) = edge_bends(mesh, &areas, |h| Some(c.face(c.twin(h)?)));
         for side in self.chains() {
             let length = |&e: &EdgeId| mesh.edge_length(e);
             let turned = side.edges.iter().map(|e| (bend[*e][0] * length(e)).sqrt());

@@ -1,0 +1,102 @@
+use super::super::samples::{Sample, ramp, strip};
+use super::super::slit::Slit;
+use super::super::{Domain, PatchLayout, PatchParams, layout};
+use crate::atlas::geometry_image::{image_origin, sample};
+use crate::geometry::deviation::{Sampling, Triangles, deviation};
+use crate::rebuild::{Images, rebuild};
+use std::collections::BTreeSet;
+
+fn laid_out(s: &Sample, domain: Domain) -> PatchLayout {
+    let params = PatchParams {
+        texel_budget: 64 * 64,
+        min_side: 8,
+        ..PatchParams::default()
+    };
+    let development = &s.development;
+    layout(
+        &s.mesh,
+        &s.length,
+        &s.cut,
+        development,
+        None,
+        domain,
+        &params,
+    )
+    .unwrap()
+}
+
+#[test]
+fn patches_meet_along_a_crease() {
+    let s = strip(
+        24,
+        10,
+        |s, t| [(s - 0.5).abs(), t, s],
+        |s, t| [std::f64::consts::SQRT_2 * s, t],
+        [0.0; 2],
+    );
+    let layout = laid_out(&s, Domain::Flat);
+    let side = |f| s.mesh.face_positions(f).iter().all(|p| p[2] <= 0.5 + 1e-9);
+    let patches = s.mesh.connectivity.faces();
+    let pairs: BTreeSet<_> = patches.map(|f| (side(f), layout.face_patch[f])).collect();
+    assert_eq!(layout.patches.len(), 2);
+    assert_eq!(pairs.len(), 2, "{pairs:?}");
+    assert_eq!(laid_out(&s, Domain::Rectangle).patches.len(), 1);
+}
+
+/// What is promised, against the error of the mesh that is made of the images.
+#[test]
+fn parts_hold_the_surface_better_with_as_many_texels() {
+    let mut bumpy = ramp(60, 40, 1.8);
+    for v in bumpy.mesh.connectivity.vertices() {
+        let p: &mut [f64; 3] = &mut bumpy.mesh.positions[v];
+        p[2] = 0.05 * (9.0 * p[0]).sin() * (8.0 * p[1]).cos();
+    }
+    let measure = |domain| {
+        let layout = laid_out(&bumpy, domain);
+        let origin = image_origin(&bumpy.mesh);
+        let images = sample(&bumpy.mesh, &layout, &bumpy.log_scale, origin);
+        let texels: usize = images.iter().map(|i| i.width * i.height).sum();
+        let made = rebuild(&Images::new(&layout, &images, origin)).unwrap();
+        let faces = bumpy.mesh.connectivity.to_faces();
+        let given = Triangles {
+            positions: bumpy.mesh.positions.as_slice(),
+            faces: &faces,
+        };
+        let made = Triangles {
+            positions: &made.positions,
+            faces: &made.faces,
+        };
+        let sampling = Sampling {
+            samples: 20_000,
+            vertices: 0,
+        };
+        let found = deviation(given, made, sampling).unwrap();
+        (layout.patches.len(), texels as f64, found.rms)
+    };
+    let (one, two) = (measure(Domain::Rectangle), measure(Domain::Flat));
+    assert!(one.0 < two.0, "{one:?} {two:?}");
+    assert!(two.1 <= 1.05 * one.1, "{one:?} {two:?}");
+    assert!(two.2 < 0.8 * one.2, "{one:?} {two:?}");
+}
+
+/// Two halves of a bent sheet fill one image as well as two, with half as many texels around them.
+#[test]
+fn halves_that_share_a_whole_side_are_united() {
+    let bent = |s: f64, t: f64| [s.sin(), t, s.cos()];
+    let s = strip(20, 20, bent, |s, t| [s, t], [0.0; 2]);
+    let slit = Slit::new(&s.mesh, &s.length, &s.cut, &s.development, None);
+    let params = PatchParams {
+        texel_budget: 64 * 64,
+        padding: 6,
+        ..PatchParams::default()
+    };
+    let faces = s.mesh.connectivity.faces();
+    let is_low = |f: &_| s.mesh.face_positions(*f).iter().map(|p| p[1]).sum::<f64>() < 1.5;
+    let (low, high): (Vec<_>, Vec<_>) = faces.partition(is_low);
+    assert!(!low.is_empty() && !high.is_empty());
+    let mut own = vec![[0.0; 2]; s.development.copies];
+    let mut divider = super::Divider::new(&slit, &params);
+    let united = divider.unite(vec![low, high], 1.0, &mut own);
+    assert_eq!(united.len(), 1);
+    assert_eq!(united[0].len(), s.mesh.connectivity.face_count());
+}
