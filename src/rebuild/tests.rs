@@ -230,6 +230,7 @@ fn a_slit_annulus_comes_back_whole() {
             let laid = lay(&s, texels);
             let (_, off) = check(&s, &laid);
             // The border is thinned to about a texel.
+            let texels: usize = laid.images.iter().map(|i| i.width * i.height).sum();
             assert!(off < 0.1 / (texels as f64).sqrt(), "{off} of {texels}");
         }
     }

@@ -141,6 +141,10 @@ fn movable(
     if keep == gone || drawing.role[keep] != Role::Node || drawing.role[gone] != Role::Node {
         return None;
     }
+    // On the surface's border a wall may arrive that does not leave: not all arms are seen from there.
+    if drawing.fine.connectivity.is_boundary_vertex(gone) {
+        return None;
+    }
     let is_fixed = |edges: &[EdgeId]| edges.iter().any(|&e| drawing.is_fixed[e]);
     let is_free = !is_fixed(&chain.edges);
     let is_chain = |arm: &Arm| arm.edges.iter().all(|e| chain.edges.contains(e));

@@ -16,7 +16,7 @@ use super::flow::Rectangle;
 use super::harmonic::{weights, with_weights};
 use super::walls::Fractions;
 use crate::atlas::plane::{distance, doubled_area};
-use crate::geometry::ids::{HalfedgeId, VertexId, VertexVec};
+use crate::geometry::ids::{HalfedgeId, VertexVec};
 use crate::geometry::mesh::{cross, norm, sub};
 
 /// How often the weights follow the stretch, at most.
@@ -33,6 +33,16 @@ pub(super) fn place(
     rectangle: &mut Rectangle,
     border: &[(usize, Fractions)],
     number: usize,
+) -> Result<(), RectangleError> {
+    place_in_rounds(rectangle, border, number, SPREADS)
+}
+
+/// The same with as many rounds of spreading at the most.
+pub(super) fn place_in_rounds(
+    rectangle: &mut Rectangle,
+    border: &[(usize, Fractions)],
+    number: usize,
+    rounds: usize,
 ) -> Result<(), RectangleError> {
     let c = &rectangle.fine.connectivity;
     let mut at: VertexVec<Option<[f64; 2]>> = VertexVec::filled(None, c.vertex_count());
@@ -56,7 +66,7 @@ pub(super) fn place(
     let given = [0, 1].map(|i| given.iter().map(|p| p[i]).collect::<Vec<f64>>());
     let mut weight = weights(flat, &rectangle.layout.length);
     let mut best: Option<(f64, VertexVec<Option<[f64; 2]>>)> = None;
-    for _ in 0..=SPREADS {
+    for _ in 0..=rounds {
         let solved = with_weights(flat, &weight, border, &given)?;
         let mut at = at.clone();
         let most = [1.0, rectangle.height];
@@ -127,14 +137,9 @@ impl Stretch {
             if !(area > 0.0 && squared.is_finite()) {
                 continue;
             }
-            for sum in corners
-                .iter()
-                .filter(|v| v.index() < count)
-                .map(|v| v.index())
-                .collect::<Vec<_>>()
-            {
-                let sum = &mut sums[VertexId::new(sum)];
-                *sum = [sum[0] + area * squared, sum[1] + area];
+            // Others were made later.
+            for v in corners.into_iter().filter(|v| v.index() < count) {
+                sums[v] = [sums[v][0] + area * squared, sums[v][1] + area];
             }
             all = [all[0] + area * squared, all[1] + area];
         }

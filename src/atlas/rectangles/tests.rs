@@ -152,25 +152,30 @@ fn both_sides_of_a_wall_have_one_parameter() {
 }
 
 #[test]
-fn the_common_parameter_is_the_mean_of_both_conformal_ones() {
-    let mut moved: f64 = 0.0;
+fn the_common_parameter_is_the_length_in_space() {
     for (name, (fine, quads)) in surfaces() {
         let rectangles = flattened(&fine, &quads);
         let borders = walls::parameters(&fine, &rectangles).unwrap();
-        let own: Vec<_> = rectangles.iter().map(own_fractions).collect();
-        let (common, own) = (pieces(&rectangles, &borders), pieces(&rectangles, &own));
-        for (wall, pieces) in &common {
-            let across = fine.connectivity.twin(*wall).map(|twin| &own[&twin]);
-            for (j, (_, _, [from, _])) in pieces.iter().enumerate() {
-                let mine = own[wall][j].2[0][0];
-                let theirs = across.map_or(mine, |across| across[pieces.len() - 1 - j].2[1][1]);
-                let mean = 0.5 * (mine + theirs);
-                assert!((from[0] - mean).abs() < 1e-8, "{name}: {} {mean}", from[0]);
-                moved = moved.max((from[0] - mine).abs());
+        for (rectangle, border) in rectangles.iter().zip(&borders) {
+            let c = &rectangle.fine.connectivity;
+            let length = |piece: &flow::Piece| {
+                let ends = c.edge_vertices(piece.edge);
+                let [p, q] = ends.map(|v| rectangle.fine.position[v]);
+                crate::geometry::mesh::distance(p, q)
+            };
+            let lengths: Vec<f64> = rectangle.border.iter().map(length).collect();
+            for side in 0..4 {
+                let on = |i: &usize| border[*i].0 == side;
+                let whole: f64 = (0..border.len()).filter(on).map(|i| lengths[i]).sum();
+                let mut before = 0.0;
+                for i in (0..border.len()).filter(on) {
+                    let expected = before / whole;
+                    assert!((border[i].1[0] - expected).abs() < 1e-9, "{name}");
+                    before += lengths[i];
+                }
             }
         }
     }
-    assert!(moved > 0.01, "{moved}");
 }
 
 /// Every face is counterclockwise, decided exactly, and they fill the rectangle, whose corners are corners.
@@ -256,13 +261,13 @@ fn a_rectangle_that_is_turned_over_is_refused() {
     );
 }
 
-/// Where nothing moves the harmonic map is nearly the flow's own: edges keep the ratio of their flat lengths.
+/// Where nothing moves and nothing is spread the harmonic map is nearly the flow's own: edges keep the ratio of their flat lengths.
 #[test]
 fn borders_that_stay_leave_the_conformal_map() {
     for (name, (fine, quads)) in surfaces() {
         for mut rectangle in flattened(&fine, &quads) {
             let border = own_fractions(&rectangle);
-            place::place(&mut rectangle, &border, 0).unwrap();
+            place::place_in_rounds(&mut rectangle, &border, 0, 0).unwrap();
             let c = &rectangle.fine.connectivity;
             let uv = |v: VertexId| rectangle.fine.corner[c.vertex_halfedge(v)].uv;
             let flat = &rectangle.layout.connectivity;
@@ -278,4 +283,52 @@ fn borders_that_stay_leave_the_conformal_map() {
             }
         }
     }
+}
+
+/// Mean squared length in space of what is a unit long in the unit square, over the surface.
+fn stretch(rectangle: &Rectangle) -> f64 {
+    let fine = &rectangle.fine;
+    let c = &fine.connectivity;
+    let squared = |f| {
+        let corners = c.face_halfedges(f);
+        let p = corners.map(|h| fine.position[c.tail(h)]);
+        let uv = corners.map(|h| fine.corner[h].uv);
+        let uv = uv.map(|[u, v]| [u, v / rectangle.height]);
+        // By finite differences along the axes, in barycentric coordinates of the face.
+        let (a, b) = (
+            [uv[1][0] - uv[0][0], uv[1][1] - uv[0][1]],
+            [uv[2][0] - uv[0][0], uv[2][1] - uv[0][1]],
+        );
+        let determinant = a[0] * b[1] - a[1] * b[0];
+        let side = |k: usize| [0, 1, 2].map(|x| p[k][x] - p[0][x]);
+        let (p, q) = (side(1), side(2));
+        let along = [[b[1], -a[1]], [-b[0], a[0]]].map(|[s, t]| {
+            let d = [0, 1, 2].map(|x| (s * p[x] + t * q[x]) / determinant);
+            d.iter().map(|x| x * x).sum::<f64>()
+        });
+        let area = 0.5 * crate::geometry::mesh::norm(crate::geometry::mesh::cross(p, q));
+        0.5 * area * (along[0] + along[1])
+    };
+    c.faces().map(squared).sum()
+}
+
+#[test]
+fn spreading_lowers_the_stretch() {
+    let mut gained: f64 = 1.0;
+    for (name, (fine, quads)) in surfaces() {
+        let mut rectangles = flattened(&fine, &quads);
+        let borders = walls::parameters(&fine, &rectangles).unwrap();
+        for (rectangle, border) in rectangles.iter_mut().zip(&borders) {
+            place::place_in_rounds(rectangle, border, 0, 0).unwrap();
+            let harmonic = stretch(rectangle);
+            place::place(rectangle, border, 0).unwrap();
+            let spread = stretch(rectangle);
+            assert!(
+                spread <= harmonic * (1.0 + 1e-12),
+                "{name}: {spread} {harmonic}"
+            );
+            gained = gained.min(spread / harmonic);
+        }
+    }
+    assert!(gained < 0.95, "{gained}");
 }

@@ -40,7 +40,7 @@ fn patches_meet_along_a_crease() {
     let pairs: BTreeSet<_> = patches.map(|f| (side(f), layout.face_patch[f])).collect();
     assert_eq!(layout.patches.len(), 2);
     assert_eq!(pairs.len(), 2, "{pairs:?}");
-    assert_eq!(laid_out(&s, Domain::Rectangle).patches.len(), 1);
+    assert_eq!(laid_out(&s, Domain::Rectangle).patches.len(), 2);
 }
 
 /// What is promised, against the error of the mesh that is made of the images.
