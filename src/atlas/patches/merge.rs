@@ -13,7 +13,8 @@ pub(super) struct Part {
     pub faces: Vec<FaceId>,
     /// Least and greatest.
     pub log_scale: [f64; 2],
-    area: f64,
+    /// In space.
+    pub area: f64,
 }
 
 impl Part {

@@ -29,6 +29,7 @@ mod resolution;
 mod seams;
 mod segment;
 mod slit;
+mod teeth;
 
 #[cfg(test)]
 pub(crate) mod samples;
@@ -45,6 +46,7 @@ pub(crate) use bend::edge_bends;
 use demand::Sums;
 use divide::Divider;
 pub use given::charts_of;
+use rayon::prelude::*;
 use rectangle::Oriented;
 pub(crate) use seams::seams;
 use slit::Slit;
@@ -276,29 +278,30 @@ pub fn layout(
     }
     let slit = Slit::new(mesh, length, cut, development, under);
     let (sets, range) = segment_into(&slit, domain, params);
-    let mut own = vec![[0.0; 2]; development.copies];
     let mut divider = Divider::new(&slit, params);
     let sets = match domain {
-        Domain::Flat => divider.divide(sets, range, &mut own),
+        Domain::Flat => divider.divide(sets, range),
         // All else is decided where lines may cross faces.
-        Domain::Rectangle => divider.divide_along_creases(sets, &mut own),
+        Domain::Rectangle => divider.divide_along_creases(sets),
     };
     let mut face_patch = FaceVec::filled(PatchId::new(0), c.face_count());
     let mut uv = FaceVec::filled([[0.0; 2]; 3], c.face_count());
     for (i, faces) in sets.iter().enumerate() {
         faces.iter().for_each(|&f| face_patch[f] = PatchId::new(i));
     }
-    let mut oriented = Vec::with_capacity(sets.len());
-    for (i, faces) in sets.iter().enumerate() {
+    let orient = |own: &mut Vec<[f64; 2]>, (i, faces): (usize, &Vec<FaceId>)| {
         let member = |f: FaceId| face_patch[f].index() == i;
-        let patch = rectangle::orient(&slit, faces, member, &mut own);
+        rectangle::orient(&slit, faces, member, own)
+    };
+    let rows = sets.par_iter().enumerate();
+    let oriented = rows.map_init(|| vec![[0.0; 2]; development.copies], orient);
+    let oriented: Vec<Oriented> = oriented.collect();
+    for (faces, patch) in sets.iter().zip(&oriented) {
         for (&f, &corners) in faces.iter().zip(&patch.uv) {
             uv[f] = corners;
         }
-        oriented.push(patch);
     }
-    let sums: Vec<Sums> = sets.iter().map(|faces| divider.sums(faces)).collect();
-    let (patches, packed) = with_images(&oriented, &sums, params);
+    let (patches, packed) = with_images(&oriented, &divider.sums(&sets), params);
     let seams = seams(mesh, &cut.is_cut, &face_patch, &uv);
     Ok(PatchLayout {
         face_patch,

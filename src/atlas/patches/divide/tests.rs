@@ -94,9 +94,8 @@ fn halves_that_share_a_whole_side_are_united() {
     let is_low = |f: &_| s.mesh.face_positions(*f).iter().map(|p| p[1]).sum::<f64>() < 1.5;
     let (low, high): (Vec<_>, Vec<_>) = faces.partition(is_low);
     assert!(!low.is_empty() && !high.is_empty());
-    let mut own = vec![[0.0; 2]; s.development.copies];
     let mut divider = super::Divider::new(&slit, &params);
-    let united = divider.unite(vec![low, high], 1.0, &mut own);
+    let united = divider.unite(vec![low, high], 1.0);
     assert_eq!(united.len(), 1);
     assert_eq!(united[0].len(), s.mesh.connectivity.face_count());
 }

@@ -4,7 +4,7 @@
 
 use super::super::merge::{Part, joins_to_a_disk, overlaps, within};
 use super::super::segment::place;
-use super::{Divider, Outline};
+use super::{Divider, Outline, Scratch};
 use crate::atlas::patches::demand::Sums;
 use crate::geometry::ids::{FaceId, FaceVec};
 use std::cmp::Reverse;
@@ -20,19 +20,15 @@ struct Piece {
 }
 
 impl Divider<'_> {
-    /// Unites patches; see the module docs. `own` is scratch space, a place a copy.
-    pub(super) fn unite(
-        &mut self,
-        patches: Vec<Vec<FaceId>>,
-        range: f64,
-        own: &mut [[f64; 2]],
-    ) -> Vec<Vec<FaceId>> {
-        let sum = self.appraise(&patches, own).max(f64::MIN_POSITIVE);
+    /// Unites patches; see the module docs.
+    pub(super) fn unite(&mut self, patches: Vec<Vec<FaceId>>, range: f64) -> Vec<Vec<FaceId>> {
+        let sum = self.appraise(&patches).max(f64::MIN_POSITIVE);
+        let mut scratch = Scratch::new(self.slit);
         let mut label = FaceVec::filled(0, self.slit.connectivity.face_count());
         let mut pieces: Vec<Piece> = Vec::with_capacity(patches.len());
         for (i, faces) in (0u32..).zip(patches) {
             faces.iter().for_each(|&f| label[f] = i);
-            pieces.push(self.piece(Part::new(self.slit, faces), own));
+            pieces.push(self.piece(Part::new(self.slit, faces), &mut scratch));
         }
         // What each pair saves in billionths, so that the last digits do not decide.
         let mut saves: BTreeMap<[u32; 2], i64> = BTreeMap::new();
@@ -42,7 +38,7 @@ impl Divider<'_> {
                 for other in self.neighbours(&pieces, one, &label) {
                     let pair = [one.min(other), one.max(other)];
                     if !saves.contains_key(&pair) {
-                        let saved = self.saved(&pieces, pair, &label, range, own);
+                        let saved = self.saved(&pieces, pair, &label, range, &mut scratch.own);
                         saves.insert(pair, (saved / sum * 1e9) as i64);
                     }
                 }
@@ -54,7 +50,7 @@ impl Divider<'_> {
                 break;
             };
             let [a, b] = pair.map(|i| &pieces[i as usize].part);
-            if overlaps(self.slit, a, b, &label, pair, own) {
+            if overlaps(self.slit, a, b, &label, pair, &mut scratch.own) {
                 saves.insert(pair, 0);
                 continue;
             }
@@ -63,7 +59,7 @@ impl Divider<'_> {
             let moved = std::mem::take(&mut pieces[from as usize].part.faces);
             moved.iter().for_each(|&f| label[f] = to);
             faces.extend(moved);
-            pieces[to as usize] = self.piece(Part::new(self.slit, faces), own);
+            pieces[to as usize] = self.piece(Part::new(self.slit, faces), &mut scratch);
             saves.retain(|p, _| !p.contains(&to) && !p.contains(&from));
             changed.push(to);
         }
@@ -71,9 +67,10 @@ impl Divider<'_> {
         faces.filter(|faces| !faces.is_empty()).collect()
     }
 
-    fn piece(&mut self, part: Part, own: &mut [[f64; 2]]) -> Piece {
-        let (sums, border) = self.sums_and_border(&part.faces);
-        let placement = self.placed(&part.faces, &border, own);
+    fn piece(&self, part: Part, scratch: &mut Scratch) -> Piece {
+        let Scratch { sets, own, .. } = scratch;
+        let (sums, border) = self.sums_and_border(&part.faces, sets);
+        let placement = self.placed(&part.faces, &border, sets, own);
         let outline = Outline::new(self.slit, sums, &border, &placement);
         Piece {
             cost: self.cost(&outline.demand),

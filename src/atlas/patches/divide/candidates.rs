@@ -1,0 +1,243 @@
+//! Where a patch may be divided: along creases, by straight lines, and between less scale and more.
+
+use super::{Divider, Outline, highest};
+use crate::atlas::patches::demand::{Demand, Sums};
+use crate::atlas::patches::overlap::Triangle;
+use crate::atlas::patches::segment::{Placement, Sets, centroid, rounded_ln};
+use crate::geometry::ids::{FaceId, FaceVec, NONE};
+use std::collections::VecDeque;
+
+/// Directions of lines, from that of the patch's rectangle on.
+const DIRECTIONS: usize = 4;
+/// Lines that are estimated in each direction; the ends of their strips meet no regular grid.
+const LINES: usize = 40;
+const OFFSET: f64 = 0.3719;
+/// The best of them that are looked at closely.
+const CANDIDATES: usize = 3;
+/// A part with less than this share of the patch's area and of its bend goes to the other side of the line, or of the crease.
+const CRUMB: f64 = 0.02;
+/// Thresholds of scale that are tried lie this far apart, or a little less.
+const SCALE_STEP: f64 = 0.5;
+
+impl Divider<'_> {
+    /// Parts between creases; crumbs belong to the part that is fewest faces away. None where creases enclose nothing large.
+    pub(super) fn by_creases(
+        &self,
+        faces: &[FaceId],
+        sets: &mut Sets,
+        label: &mut FaceVec<u32>,
+    ) -> Vec<Vec<FaceId>> {
+        let slit = self.slit;
+        let c = slit.connectivity;
+        let stamp = sets.mark(faces);
+        let beside = |sets: &Sets, f: FaceId| {
+            c.face_halfedges(f).map(|h| {
+                let g = slit.beside(h).filter(|&g| sets.has(g, stamp));
+                g.map(|g| (g, c.edge(h)))
+            })
+        };
+        let has_crease = |f| c.face_edges(f).into_iter().any(|e| self.bends.is_crease[e]);
+        if !faces.iter().any(|&f| has_crease(f)) {
+            return Vec::new();
+        }
+        let mut parts: Vec<(Vec<FaceId>, f64)> = Vec::new();
+        faces.iter().for_each(|&f| label[f] = NONE);
+        for &first in faces {
+            if label[first] != NONE {
+                continue;
+            }
+            label[first] = 0;
+            let (mut part, mut area) = (vec![first], 0.0);
+            let mut next = 0;
+            while let Some(&f) = part.get(next) {
+                next += 1;
+                area += slit.source_area[f];
+                for (g, e) in beside(sets, f).into_iter().flatten() {
+                    if !self.bends.is_crease[e] && label[g] == NONE {
+                        label[g] = 0;
+                        part.push(g);
+                    }
+                }
+            }
+            parts.push((part, area));
+        }
+        let least = CRUMB * parts.iter().map(|part| part.1).sum::<f64>();
+        parts.retain(|part| part.1 >= least);
+        if parts.len() < 2 {
+            return Vec::new();
+        }
+        faces.iter().for_each(|&f| label[f] = NONE);
+        let mut queue: VecDeque<FaceId> = VecDeque::new();
+        for (own, (part, _)) in (0u32..).zip(&parts) {
+            part.iter().for_each(|&f| label[f] = own);
+            queue.extend(part);
+        }
+        while let Some(f) = queue.pop_front() {
+            for (g, _) in beside(sets, f).into_iter().flatten() {
+                if label[g] == NONE {
+                    label[g] = label[f];
+                    queue.push_back(g);
+                }
+            }
+        }
+        // In the order given, as all sets of faces are.
+        let mut sides = vec![Vec::new(); parts.len()];
+        for &f in faces {
+            if let Some(side) = sides.get_mut(label[f] as usize) {
+                side.push(f);
+            }
+        }
+        sides
+    }
+
+    /// The sides of the lines that promise most, by the rectangles in their direction.
+    pub(super) fn by_lines(
+        &self,
+        faces: &[FaceId],
+        placement: &Placement,
+        outline: &Outline,
+        sets: &mut Sets,
+    ) -> Vec<Vec<Vec<FaceId>>> {
+        let slit = self.slit;
+        let triangles = faces.iter().map(|&f| placement.triangle(slit, f));
+        let triangles: Vec<Triangle> = triangles.collect();
+        let mut promised: Vec<(i64, usize, usize)> = Vec::new();
+        let mut strips: Vec<Vec<u8>> = Vec::new();
+        for direction in 0..DIRECTIONS {
+            let angle = outline.angle + std::f64::consts::PI * direction as f64 / DIRECTIONS as f64;
+            let axis = [angle.cos(), angle.sin()];
+            let along = |p: [f64; 2]| {
+                [
+                    axis[0] * p[0] + axis[1] * p[1],
+                    axis[0] * p[1] - axis[1] * p[0],
+                ]
+            };
+            let mut range = Extent::default();
+            outline
+                .border
+                .iter()
+                .flatten()
+                .for_each(|&p| range.add(along(p)));
+            let (low, length) = (range.low[0], range.high[0] - range.low[0]);
+            let mut strip = Vec::with_capacity(faces.len());
+            let mut rows = vec![(Sums::default(), Extent::default()); LINES + 1];
+            for (&f, t) in faces.iter().zip(&triangles) {
+                let t = t.map(along);
+                let at = (centroid(&t)[0] - low) / length.max(f64::MIN_POSITIVE);
+                let at = (at * (LINES as f64 + OFFSET)).clamp(0.0, LINES as f64) as usize;
+                strip.push(at as u8);
+                rows[at].0 = rows[at].0.and(self.bends.of_face[f]);
+                t.into_iter().for_each(|p| rows[at].1.add(p));
+            }
+            let below = self.running(rows.iter());
+            let above = self.running(rows.iter().rev());
+            for line in 1..=LINES {
+                let (one, other) = (below[line - 1], above[LINES - line]);
+                if one > 0.0 && other > 0.0 {
+                    promised.push((rounded_ln(one + other), direction, line));
+                }
+            }
+            strips.push(strip);
+        }
+        promised.sort_unstable();
+        // One a direction: its neighbours are much the same.
+        let mut seen = [false; DIRECTIONS];
+        promised.retain(|&(_, direction, _)| !std::mem::replace(&mut seen[direction], true));
+        promised.truncate(CANDIDATES);
+        let sides = promised.into_iter().map(|(_, direction, line)| {
+            let is_below = strips[direction].iter().map(|&s| usize::from(s) < line);
+            let is_below: Vec<bool> = is_below.collect();
+            self.without_crumbs(faces, &is_below, sets)
+        });
+        sides.collect()
+    }
+
+    /// Connected parts of less scale and of more: a texel is of one width in the plane, so where scale is least the surface is held worst.
+    pub(super) fn by_scale(&self, faces: &[FaceId], sets: &mut Sets) -> Vec<Vec<Vec<FaceId>>> {
+        let slit = self.slit;
+        let scales = faces.iter().map(|&f| slit.log_scale[f]);
+        let lowest = scales.fold(f64::INFINITY, f64::min);
+        let range = highest(slit, faces) - lowest;
+        let steps = (range / SCALE_STEP).ceil().min(64.0) as usize;
+        let thresholds = (1..steps).map(|i| lowest + range * i as f64 / steps as f64);
+        let thresholds: Vec<f64> = thresholds.collect();
+        let sides = thresholds.into_iter().map(|most| {
+            let is_below = faces.iter().map(|&f| slit.log_scale[f] <= most);
+            let is_below: Vec<bool> = is_below.collect();
+            self.without_crumbs(faces, &is_below, sets)
+        });
+        sides.collect()
+    }
+
+    /// Cost of the rows so far, for every number of rows.
+    fn running<'r>(&self, rows: impl Iterator<Item = &'r (Sums, Extent)>) -> Vec<f64> {
+        let (mut sums, mut extent) = (Sums::default(), Extent::default());
+        rows.map(|row| {
+            sums = sums.and(row.0);
+            extent.low = [0, 1].map(|i| extent.low[i].min(row.1.low[i]));
+            extent.high = [0, 1].map(|i| extent.high[i].max(row.1.high[i]));
+            let sides = [0, 1].map(|i| (extent.high[i] - extent.low[i]).max(0.0));
+            self.cost(&Demand { sums, sides })
+        })
+        .collect()
+    }
+
+    /// Connected parts of the two sides, small pieces in the side that surrounds them.
+    fn without_crumbs(
+        &self,
+        faces: &[FaceId],
+        is_below: &[bool],
+        sets: &mut Sets,
+    ) -> Vec<Vec<FaceId>> {
+        // Few texels hold a small piece, unless it bends most.
+        let weights = |part: &[FaceId]| {
+            let sums = part.iter().map(|&f| self.bends.of_face[f]);
+            let sums = sums.fold(Sums::default(), Sums::and);
+            [sums.area, sums.bend[1]]
+        };
+        let least = weights(faces).map(|weight| CRUMB * weight);
+        let mut sides: [Vec<Vec<FaceId>>; 2] = Default::default();
+        let mut is_whole = true;
+        for side in [false, true] {
+            let own = faces.iter().zip(is_below).filter(|row| *row.1 == side);
+            let own: Vec<FaceId> = own.map(|row| *row.0).collect();
+            for component in sets.components(&own) {
+                let own = weights(&component);
+                let is_small = own[0] < least[0] && own[1] <= least[1];
+                is_whole &= !is_small;
+                sides[usize::from(side != is_small)].push(component);
+            }
+        }
+        let parts = sides.into_iter().flat_map(|side| {
+            if is_whole {
+                side
+            } else {
+                sets.components(&side.concat())
+            }
+        });
+        parts.collect()
+    }
+}
+
+/// Least and greatest coordinates.
+#[derive(Clone, Copy)]
+struct Extent {
+    low: [f64; 2],
+    high: [f64; 2],
+}
+
+impl Default for Extent {
+    fn default() -> Self {
+        Self {
+            low: [f64::INFINITY; 2],
+            high: [f64::NEG_INFINITY; 2],
+        }
+    }
+}
+
+impl Extent {
+    fn add(&mut self, p: [f64; 2]) {
+        self.low = [0, 1].map(|i| self.low[i].min(p[i]));
+        self.high = [0, 1].map(|i| self.high[i].max(p[i]));
+    }
+}
