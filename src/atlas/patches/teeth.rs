@@ -54,11 +54,11 @@ pub(super) fn trim(
             };
             let [from, to] = [label[f], other].map(|i| i as usize);
             let rest = patches[from].part.area - slit.source_area[f];
-            if rest < patches[from].least_area || !patches[to].fits(slit, f, range) {
+            if rest < patches[from].least_area || !patches[to].fits(slit, f, other, &label, range) {
                 continue;
             }
             label[f] = other;
-            patches[from].part.area = rest;
+            patches[from].give(slit, f, &label);
             patches[to].take(slit, f);
             next.extend(slit.neighbours(f));
         }
@@ -109,18 +109,32 @@ impl Patch {
         [low.min(scale), high.max(scale)]
     }
 
-    /// True where the patch stays within the range of scale and injective with one face more.
-    fn fits(&mut self, slit: &Slit, f: FaceId, range: f64) -> bool {
+    /// What lies behind the face is on the border now.
+    fn give(&mut self, slit: &Slit, f: FaceId, label: &FaceVec<u32>) {
+        self.part.area -= slit.source_area[f];
+        if let Some(index) = &mut self.index {
+            let behind = slit.neighbours(f).filter(|&g| label[g] != label[f]);
+            behind.for_each(|g| index.insert(central(slit, g)));
+        }
+    }
+
+    /// True where the patch, which has this label, stays within the range of scale and injective with one face more.
+    ///
+    /// A face beside an injective disk overlaps it only where the disk's border runs into the face: looking at the faces on the border is enough. Those that
+    /// it gave away are looked at as well, and refuse nothing, since nothing else of the disk lay there.
+    fn fits(&mut self, slit: &Slit, f: FaceId, own: u32, label: &FaceVec<u32>, range: f64) -> bool {
         let [low, high] = self.log_scale_with(slit, f);
         if high - low > range || slit.is_deep(high) {
             return false;
         }
-        // Faces that it gave away stay in the index: where they lie nothing else of its own does.
         let faces = &self.part.faces;
         let index = self.index.get_or_insert_with(|| {
             let placement = Placement::new(slit, slit.central.as_slice(), faces.iter().copied());
-            let mut index = placement.index(slit, faces);
-            faces.iter().for_each(|&f| index.insert(central(slit, f)));
+            let inner = |g: FaceId| slit.neighbours(g).filter(|&n| label[n] == own).count() == 3;
+            let border = faces.iter().copied();
+            let border: Vec<FaceId> = border.filter(|&g| label[g] == own && !inner(g)).collect();
+            let mut index = placement.index(slit, &border);
+            border.iter().for_each(|&g| index.insert(central(slit, g)));
             index
         });
         !index.overlaps(&central(slit, f))
