@@ -16,6 +16,8 @@ const OFFSET: f64 = 0.3719;
 const CANDIDATES: usize = 3;
 /// A part with less than this share of the patch's area and of its bend goes to the other side of the line, or of the crease.
 const CRUMB: f64 = 0.02;
+/// Lines are looked at closely that may cost this times what they may: their rectangles are not the smallest ones.
+const SLACK: f64 = 1.1;
 /// Thresholds of scale that are tried lie this far apart, or a little less.
 const SCALE_STEP: f64 = 0.5;
 
@@ -90,12 +92,13 @@ impl Divider<'_> {
         sides
     }
 
-    /// The sides of the lines that promise most, by the rectangles in their direction.
+    /// The sides of the lines that promise most, by the rectangles in their direction, and that may cost no more than `most`.
     pub(super) fn by_lines(
         &self,
         faces: &[FaceId],
         placement: &Placement,
         outline: &Outline,
+        most: f64,
         sets: &mut Sets,
     ) -> Vec<Vec<Vec<FaceId>>> {
         let slit = self.slit;
@@ -133,7 +136,7 @@ impl Divider<'_> {
             let above = self.running(rows.iter().rev());
             for line in 1..=LINES {
                 let (one, other) = (below[line - 1], above[LINES - line]);
-                if one > 0.0 && other > 0.0 {
+                if one > 0.0 && other > 0.0 && one + other <= SLACK * most {
                     promised.push((rounded_ln(one + other), direction, line));
                 }
             }
@@ -147,13 +150,20 @@ impl Divider<'_> {
         let sides = promised.into_iter().map(|(_, direction, line)| {
             let is_below = strips[direction].iter().map(|&s| usize::from(s) < line);
             let is_below: Vec<bool> = is_below.collect();
-            self.without_crumbs(faces, &is_below, sets)
+            self.without_crumbs(faces, &is_below, &outline.demand.sums, sets)
         });
         sides.collect()
     }
 
-    /// Connected parts of less scale and of more: a texel is of one width in the plane, so where scale is least the surface is held worst.
-    pub(super) fn by_scale(&self, faces: &[FaceId], sets: &mut Sets) -> Vec<Vec<Vec<FaceId>>> {
+    /// Connected parts of less scale and of more: a texel is of one width in the plane, so where scale is least the surface is held worst. Where parts that
+    /// filled their rectangles as the patch does would cost more than `most` they are left out.
+    pub(super) fn by_scale(
+        &self,
+        faces: &[FaceId],
+        outline: &Outline,
+        most: f64,
+        sets: &mut Sets,
+    ) -> Vec<Vec<Vec<FaceId>>> {
         let slit = self.slit;
         let scales = faces.iter().map(|&f| slit.log_scale[f]);
         let lowest = scales.fold(f64::INFINITY, f64::min);
@@ -161,10 +171,20 @@ impl Divider<'_> {
         let steps = (range / SCALE_STEP).ceil().min(64.0) as usize;
         let thresholds = (1..steps).map(|i| lowest + range * i as f64 / steps as f64);
         let thresholds: Vec<f64> = thresholds.collect();
-        let sides = thresholds.into_iter().map(|most| {
-            let is_below = faces.iter().map(|&f| slit.log_scale[f] <= most);
+        let whole = outline.demand;
+        let sides = thresholds.into_iter().filter_map(|threshold| {
+            let is_below = faces.iter().map(|&f| slit.log_scale[f] <= threshold);
             let is_below: Vec<bool> = is_below.collect();
-            self.without_crumbs(faces, &is_below, sets)
+            let cost = |side: bool| {
+                let own = faces.iter().zip(&is_below).filter(|row| *row.1 == side);
+                let sums = own.map(|row| self.bends.of_face[*row.0]);
+                let sums = sums.fold(Sums::default(), Sums::and);
+                let part = (sums.flat / whole.sums.flat).sqrt();
+                let sides = whole.sides.map(|side| side * part);
+                self.cost(&Demand { sums, sides })
+            };
+            let is_promising = cost(false) + cost(true) <= most;
+            is_promising.then(|| self.without_crumbs(faces, &is_below, &whole.sums, sets))
         });
         sides.collect()
     }
@@ -187,22 +207,20 @@ impl Divider<'_> {
         &self,
         faces: &[FaceId],
         is_below: &[bool],
+        whole: &Sums,
         sets: &mut Sets,
     ) -> Vec<Vec<FaceId>> {
         // Few texels hold a small piece, unless it bends most.
-        let weights = |part: &[FaceId]| {
-            let sums = part.iter().map(|&f| self.bends.of_face[f]);
-            let sums = sums.fold(Sums::default(), Sums::and);
-            [sums.area, sums.bend[1]]
-        };
-        let least = weights(faces).map(|weight| CRUMB * weight);
+        let weight = |sums: Sums| [sums.area, sums.bend[1]];
+        let least = weight(*whole).map(|weight| CRUMB * weight);
         let mut sides: [Vec<Vec<FaceId>>; 2] = Default::default();
         let mut is_whole = true;
         for side in [false, true] {
             let own = faces.iter().zip(is_below).filter(|row| *row.1 == side);
             let own: Vec<FaceId> = own.map(|row| *row.0).collect();
             for component in sets.components(&own) {
-                let own = weights(&component);
+                let sums = component.iter().map(|&f| self.bends.of_face[f]);
+                let own = weight(sums.fold(Sums::default(), Sums::and));
                 let is_small = own[0] < least[0] && own[1] <= least[1];
                 is_whole &= !is_small;
                 sides[usize::from(side != is_small)].push(component);
