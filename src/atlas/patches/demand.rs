@@ -35,6 +35,14 @@ impl Sums {
             bend: [0, 1].map(|i| self.bend[i] + other.bend[i]),
         }
     }
+
+    pub fn times(self, factor: f64) -> Self {
+        Self {
+            area: factor * self.area,
+            flat: factor * self.flat,
+            bend: self.bend.map(|bend| factor * bend),
+        }
+    }
 }
 
 /// A patch as its image sees it, in units of the plane.

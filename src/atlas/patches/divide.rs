@@ -20,7 +20,7 @@ use super::demand::{self, Budget, Demand, Sums};
 use super::overlap::Triangle;
 use super::rectangle::smallest;
 use super::resolution::coarsest;
-use super::segment::{CLEAR, Placement, Sets, place, split_at_holes};
+use super::segment::{Placement, Sets, place, split_at_holes};
 use super::slit::Slit;
 use super::teeth::trim;
 use crate::atlas::plane::wrap_angle;
@@ -34,6 +34,8 @@ const LEAST_GAIN: f64 = 0.015;
 /// A patch in parts.
 struct Division {
     parts: Vec<Vec<FaceId>>,
+    /// Their faces that have a side on their border.
+    borders: Vec<Vec<FaceId>>,
     /// What they cost less.
     saved: f64,
 }
@@ -42,8 +44,6 @@ struct Division {
 struct Row {
     faces: Vec<FaceId>,
     division: Option<Division>,
-    /// Where it is placed like the central chart: by how much two of its faces overlap at the most. Infinite where nobody has looked.
-    clear: f64,
 }
 
 /// What division needs to know of a surface.
@@ -151,8 +151,7 @@ impl<'a> Divider<'a> {
         let mut sum = self.appraise(&patches);
         // Half of what it must save now: the sum falls.
         self.least_saved = 0.5 * sum * (1.0 - 10f64.powf(-LEAST_GAIN / 30.0));
-        let patches = patches.into_iter().map(|faces| (faces, f64::INFINITY));
-        let mut rows = self.best_divisions(patches.collect());
+        let mut rows = self.best_divisions(patches);
         loop {
             let most = self.params.max_count;
             let room = most.map(|most| most.saturating_sub(rows.len()));
@@ -176,17 +175,16 @@ impl<'a> Divider<'a> {
                 let row = rows.swap_remove(i);
                 if let Some(division) = row.division {
                     sum -= division.saved;
-                    parts.extend(division.parts.into_iter().map(|faces| (faces, row.clear)));
+                    parts.extend(division.parts);
                 }
             }
             rows.extend(self.best_divisions(parts));
         }
     }
 
-    /// How patches are best divided, each of which comes with how clear it is.
-    fn best_divisions(&self, patches: Vec<(Vec<FaceId>, f64)>) -> Vec<Row> {
-        let best =
-            |scratch: &mut Scratch<'a>, (faces, clear)| self.best_division(faces, clear, scratch);
+    /// How patches are best divided.
+    fn best_divisions(&self, patches: Vec<Vec<FaceId>>) -> Vec<Row> {
+        let best = |scratch: &mut Scratch<'a>, faces| self.best_division(faces, scratch);
         let rows = patches.into_par_iter().with_max_len(1);
         rows.map_init(|| Scratch::new(self.slit), best).collect()
     }
@@ -211,15 +209,12 @@ impl<'a> Divider<'a> {
         place(slit, border.iter().copied(), root, highest, member, own)
     }
 
-    /// How a patch is best divided, of whose faces no two overlap by more than `clear` in the central chart.
-    fn best_division(&self, faces: Vec<FaceId>, clear: f64, scratch: &mut Scratch<'a>) -> Row {
+    /// How a patch is best divided.
+    fn best_division(&self, faces: Vec<FaceId>, scratch: &mut Scratch<'a>) -> Row {
         let slit = self.slit;
         let Scratch { sets, label, own } = scratch;
         let (sums, border) = self.sums_and_border(&faces, sets);
         let placement = self.placed(&faces, &border, sets, own);
-        let is_central = !slit.is_deep(highest(slit, &faces));
-        // Elsewhere the patch has been placed anew.
-        let mut clear = if is_central { clear } else { f64::INFINITY };
         let outline = Outline::new(slit, sums, &border, &placement);
         let now = self.cost(&outline.demand);
         let mut tried = Vec::new();
@@ -243,27 +238,14 @@ impl<'a> Divider<'a> {
         }
         // Stable: of equals the first.
         found.sort_by_key(|f| f.0);
-        let mut has_looked = false;
-        let mut is_injective = |faces_of_part: &Vec<FaceId>| {
-            let part = faces_of_part.iter().copied();
-            let part = Placement::new(slit, placement.positions, part);
-            if part.tolerance() < clear && !has_looked {
-                has_looked = true;
-                let least = CLEAR * placement.tolerance();
-                if placement.is_injective_by(slit, &faces, least) {
-                    clear = least;
-                }
-            }
-            part.tolerance() >= clear || part.is_injective(slit, faces_of_part)
-        };
         let mut found = found.into_iter().map(|f| f.1);
-        let division = found.find(|division| division.parts.iter().all(&mut is_injective));
-        let clear = if is_central { clear } else { f64::INFINITY };
-        Row {
-            faces,
-            division,
-            clear,
-        }
+        // What touches in the patch may overlap in a part, which is smaller and so is what counts as touching.
+        let is_injective = |border: &Vec<FaceId>| {
+            let part = Placement::new(slit, placement.positions, border.iter().copied());
+            part.is_injective(slit, border)
+        };
+        let division = found.find(|division| division.borders.iter().all(is_injective));
+        Row { faces, division }
     }
 
     /// A division into the disks that connected parts are made of; `None` where there is one only, or they cost more.
@@ -282,15 +264,21 @@ impl<'a> Divider<'a> {
             return None;
         }
         let mut saved = now;
+        let mut borders = Vec::with_capacity(parts.len());
         for faces in &parts {
             let (sums, border) = self.sums_and_border(faces, sets);
             let outline = Outline::new(self.slit, sums, &border, placement);
             saved -= self.cost(&outline.demand);
+            borders.push(border);
             if saved <= 0.0 {
                 return None;
             }
         }
-        Some(Division { parts, saved })
+        Some(Division {
+            parts,
+            borders,
+            saved,
+        })
     }
 
     /// Areas and bend of a patch, and its faces that have a side on its border.

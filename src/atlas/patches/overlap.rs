@@ -141,11 +141,7 @@ impl TriangleIndex {
 
     /// True where the triangle overlaps one that was added.
     pub fn overlaps(&self, t: &Triangle) -> bool {
-        self.overlaps_by(t, self.tolerance)
-    }
-
-    /// The same with a tolerance of its own.
-    pub fn overlaps_by(&self, t: &Triangle, tolerance: f64) -> bool {
+        let tolerance = self.tolerance;
         let own = self.level_of(t);
         let larger = |k: &i32| self.used[(k - self.levels[0]) as usize];
         let mut below: Vec<Cell> = Vec::new();

@@ -30,10 +30,6 @@ const GROWTH: f64 = 0.9;
 /// not do: a patch may be a thousandth of it, and what touches there overlaps in the patch.
 pub(super) const TOUCHING: f64 = 1e-10;
 
-/// Faces that overlap by no more than this part of the tolerance are clear of each other: parts of what they make need no second
-/// look at their own, smaller extent unless it is smaller by as much.
-pub(super) const CLEAR: f64 = 1e-2;
-
 /// Rounds of merging and dividing: each can make the other possible again, hardly ever often.
 const ROUNDS: usize = 3;
 
@@ -75,17 +71,15 @@ impl<'a> Placement<'a> {
         TOUCHING * self.extent
     }
 
-    /// True where no two of these faces overlap.
-    pub fn is_injective(&self, slit: &Slit, faces: &[FaceId]) -> bool {
-        self.is_injective_by(slit, faces, self.tolerance())
-    }
-
-    /// The same with a tolerance of its own.
-    pub fn is_injective_by(&self, slit: &Slit, faces: &[FaceId], tolerance: f64) -> bool {
-        let mut index = self.index(slit, faces);
-        faces.iter().all(|&f| {
+    /// True where no two faces of a disk overlap, of which those with a side on its border are given.
+    ///
+    /// They are enough: where two sheets of a disk overlap the border of one ends, and it crosses the border of the other, since an immersed disk whose border is
+    /// a simple curve is embedded.
+    pub fn is_injective(&self, slit: &Slit, border: &[FaceId]) -> bool {
+        let mut index = self.index(slit, border);
+        border.iter().all(|&f| {
             let triangle = self.triangle(slit, f);
-            let free = !index.overlaps_by(&triangle, tolerance);
+            let free = !index.overlaps(&triangle);
             index.insert(triangle);
             free
         })
@@ -207,7 +201,7 @@ fn cover(
         let stamp = sets.mark(&region);
         let member = |f| sets.stamp[f] == stamp;
         let placement = place(slit, region.iter().copied(), seed, highest, member, own);
-        let (grown, is_clear) = grow(sets, &region, seed, stamp, &placement);
+        let grown = grow(sets, &region, seed, stamp, &placement);
         let stamp = sets.mark(&grown);
         let left_over = region.iter().filter(|&&f| sets.stamp[f] != stamp);
         rest.extend(left_over.copied());
@@ -218,10 +212,9 @@ fn cover(
             // then it loses a face at least.
             let positions = placement.positions;
             let closer = Placement::new(slit, positions, disk.iter().copied());
-            // The first growth has often shown it.
-            let is_known = closer.extent == placement.extent
-                || is_clear && closer.tolerance() >= CLEAR * placement.tolerance();
-            if is_known || closer.is_injective(slit, &disk) {
+            // The growth has shown it for what is as large.
+            let is_known = closer.extent == placement.extent;
+            if is_known || closer.is_injective(slit, &sets.border(&disk)) {
                 disks.push(disk);
             } else {
                 stack.push(disk);
@@ -320,6 +313,16 @@ impl<'a> Sets<'a> {
         self.last
     }
 
+    /// The faces of a set that have a side on its border.
+    pub(super) fn border(&mut self, faces: &[FaceId]) -> Vec<FaceId> {
+        let set = self.mark(faces);
+        let is_inner = |f: FaceId| {
+            let beside = self.slit.neighbours(f);
+            beside.filter(|&n| self.stamp[n] == set).count() == 3
+        };
+        faces.iter().copied().filter(|&f| !is_inner(f)).collect()
+    }
+
     /// Euler characteristic of a set of faces: 1 for a connected set that is a disk.
     fn euler_characteristic(&mut self, faces: &[FaceId]) -> i64 {
         let (slit, set) = (self.slit, self.mark(faces));
@@ -397,14 +400,14 @@ pub(super) fn centroid(t: &Triangle) -> [f64; 2] {
 }
 
 /// Faces of a region (those with the stamp, which is taken from some) that lie injectively in the plane, nearest to the seed
-/// first; and whether all of them are clear of each other.
+/// first.
 fn grow(
     sets: &mut Sets,
     region: &[FaceId],
     seed: FaceId,
     stamp: u32,
     placement: &Placement,
-) -> (Vec<FaceId>, bool) {
+) -> Vec<FaceId> {
     let slit = sets.slit;
     let mut index = placement.index(slit, region);
     let start = centroid(&placement.triangle(slit, seed));
@@ -417,15 +420,11 @@ fn grow(
     sets.stamp[seed] = seen;
     let mut queue = BinaryHeap::from([Reverse((0, seed))]);
     let mut grown = Vec::new();
-    let mut is_clear = true;
     while let Some(Reverse((_, f))) = queue.pop() {
         let triangle = placement.triangle(slit, f);
         // What overlaps now will always: the patch only grows.
-        if index.overlaps_by(&triangle, CLEAR * placement.tolerance()) {
-            if index.overlaps(&triangle) {
-                continue;
-            }
-            is_clear = false;
+        if index.overlaps(&triangle) {
+            continue;
         }
         index.insert(triangle);
         grown.push(f);
@@ -436,7 +435,7 @@ fn grow(
             }
         }
     }
-    (grown, is_clear)
+    grown
 }
 
 /// Cuts a connected injective set into disks along straight lines through its holes.

@@ -12,6 +12,8 @@ const DIRECTIONS: usize = 4;
 /// Lines that are estimated in each direction; the ends of their strips meet no regular grid.
 const LINES: usize = 40;
 const OFFSET: f64 = 0.3719;
+/// They are estimated by about so many faces.
+const SAMPLE: usize = 16_384;
 /// The best of them that are looked at closely.
 const CANDIDATES: usize = 3;
 /// A part with less than this share of the patch's area and of its bend goes to the other side of the line, or of the crease.
@@ -102,35 +104,37 @@ impl Divider<'_> {
         sets: &mut Sets,
     ) -> Vec<Vec<Vec<FaceId>>> {
         let slit = self.slit;
-        let triangles = faces.iter().map(|&f| placement.triangle(slit, f));
-        let triangles: Vec<Triangle> = triangles.collect();
+        // By their numbers, since their order changes with the last digits of scales.
+        let every = faces.len() / SAMPLE + 1;
+        let is_sampled = |f: &FaceId| f.index() % every == 0;
+        let sampled = faces.iter().copied().filter(is_sampled);
+        let sampled = sampled.map(|f| (placement.triangle(slit, f), self.bends.of_face[f]));
+        let sampled: Vec<(Triangle, Sums)> = sampled.collect();
+        let each = faces.len() as f64 / sampled.len().max(1) as f64;
+        let mut directions = Vec::with_capacity(DIRECTIONS);
         let mut promised: Vec<(i64, usize, usize)> = Vec::new();
-        let mut strips: Vec<Vec<u8>> = Vec::new();
         for direction in 0..DIRECTIONS {
             let angle = outline.angle + std::f64::consts::PI * direction as f64 / DIRECTIONS as f64;
-            let axis = [angle.cos(), angle.sin()];
-            let along = |p: [f64; 2]| {
-                [
-                    axis[0] * p[0] + axis[1] * p[1],
-                    axis[0] * p[1] - axis[1] * p[0],
-                ]
+            let mut strips = Strips {
+                axis: [angle.cos(), angle.sin()],
+                low: 0.0,
+                length: 1.0,
             };
             let mut range = Extent::default();
-            outline
-                .border
-                .iter()
-                .flatten()
-                .for_each(|&p| range.add(along(p)));
-            let (low, length) = (range.low[0], range.high[0] - range.low[0]);
-            let mut strip = Vec::with_capacity(faces.len());
+            let border = outline.border.iter().flatten();
+            border.for_each(|&p| range.add(strips.along(p)));
+            strips.low = range.low[0];
+            strips.length = (range.high[0] - range.low[0]).max(f64::MIN_POSITIVE);
             let mut rows = vec![(Sums::default(), Extent::default()); LINES + 1];
-            for (&f, t) in faces.iter().zip(&triangles) {
-                let t = t.map(along);
-                let at = (centroid(&t)[0] - low) / length.max(f64::MIN_POSITIVE);
-                let at = (at * (LINES as f64 + OFFSET)).clamp(0.0, LINES as f64) as usize;
-                strip.push(at as u8);
-                rows[at].0 = rows[at].0.and(self.bends.of_face[f]);
-                t.into_iter().for_each(|p| rows[at].1.add(p));
+            for (t, sums) in &sampled {
+                let row = &mut rows[strips.of(t)];
+                row.0 = row.0.and(sums.times(each));
+                t.iter().for_each(|&p| row.1.add(strips.along(p)));
+            }
+            // Strips end where the border does, and hardly any other face is sampled that shows it.
+            for t in &outline.border {
+                let row = &mut rows[strips.of(t)];
+                t.iter().for_each(|&p| row.1.add(strips.along(p)));
             }
             let below = self.running(rows.iter());
             let above = self.running(rows.iter().rev());
@@ -140,7 +144,7 @@ impl Divider<'_> {
                     promised.push((rounded_ln(one + other), direction, line));
                 }
             }
-            strips.push(strip);
+            directions.push(strips);
         }
         promised.sort_unstable();
         // One a direction: its neighbours are much the same.
@@ -148,7 +152,9 @@ impl Divider<'_> {
         promised.retain(|&(_, direction, _)| !std::mem::replace(&mut seen[direction], true));
         promised.truncate(CANDIDATES);
         let sides = promised.into_iter().map(|(_, direction, line)| {
-            let is_below = strips[direction].iter().map(|&s| usize::from(s) < line);
+            let strips = &directions[direction];
+            let is_below = |&f: &FaceId| strips.of(&placement.triangle(slit, f)) < line;
+            let is_below = faces.iter().map(is_below);
             let is_below: Vec<bool> = is_below.collect();
             self.without_crumbs(faces, &is_below, &outline.demand.sums, sets)
         });
@@ -234,6 +240,28 @@ impl Divider<'_> {
             }
         });
         parts.collect()
+    }
+}
+
+/// Strips across an axis, one more than there are lines between them.
+struct Strips {
+    axis: [f64; 2],
+    /// Where the first one begins, and what all measure.
+    low: f64,
+    length: f64,
+}
+
+impl Strips {
+    /// Coordinates along the axis and across.
+    fn along(&self, p: [f64; 2]) -> [f64; 2] {
+        let [x, y] = self.axis;
+        [x * p[0] + y * p[1], x * p[1] - y * p[0]]
+    }
+
+    /// The strip of a triangle's middle.
+    fn of(&self, t: &Triangle) -> usize {
+        let at = (self.along(centroid(t))[0] - self.low) / self.length;
+        (at * (LINES as f64 + OFFSET)).clamp(0.0, LINES as f64) as usize
     }
 }
 
