@@ -2,13 +2,14 @@
 //!
 //! `cargo bench --bench images -- [--peers DIR] [--flat] MESH…`: 128², 256² and 512² texels in all images together, their margins included. DIR holds
 //! `NAME.TOOL.obj`, the mesh with the texture coordinates of a tool, as `benches/peers/atlases.py` writes them. PSNR is
-//! 20 log10(diagonal / symmetric RMS distance) of the mesh that is rebuilt from images and seam samples. `--flat` leaves rectangles out. Nothing here is timed.
+//! 20 log10(diagonal / symmetric RMS distance) of the mesh that is rebuilt from images and seam samples. `--flat` leaves rectangles out. Flat images are those of
+//! `preset = "geometry-image-256"`, and charts of other programs get its padding too. Nothing here is timed.
 
 mod common;
 
 use affine_atlas::atlas::geometry_image::{image_origin, sample};
 use affine_atlas::atlas::patches::{Domain, PatchLayout, PatchParams, charts_of};
-use affine_atlas::config::Config;
+use affine_atlas::config::{self, Config};
 use affine_atlas::geometry::deviation::{Sampling, Triangles, deviation};
 use affine_atlas::geometry::ids::{FaceVec, VertexVec};
 use affine_atlas::geometry::mesh::{AttributeKind, Mesh, Soup};
@@ -81,9 +82,18 @@ fn row(name: &str, atlas: &str, of: impl Fn(usize) -> Result<Found, Box<dyn Erro
     println!("| {name} | {atlas} | {patches} | {} |", cells.join(" | "));
 }
 
-fn ours(soup: &Soup, domain: Domain, side: usize) -> Result<Found, Box<dyn Error>> {
-    let mut config = Config::default();
+/// Flat images as the preset for them makes them, rectangles by default.
+fn settings(domain: Domain) -> Result<Config, Box<dyn Error>> {
+    let mut config = match domain {
+        Domain::Flat => config::parse("settings", "preset = \"geometry-image-256\"", &[])?,
+        Domain::Rectangle => Config::default(),
+    };
     config.images.domain = domain;
+    Ok(config)
+}
+
+fn ours(soup: &Soup, domain: Domain, side: usize) -> Result<Found, Box<dyn Error>> {
+    let mut config = settings(domain)?;
     config.patches.texel_budget = side * side;
     config.patches.min_side = MIN_SIDE;
     let atlas = job::build(soup, &config, &())?.swap_remove(0)?;
@@ -110,6 +120,7 @@ fn theirs(mesh: &Mesh, side: usize) -> Result<Found, Box<dyn Error>> {
     let params = PatchParams {
         texel_budget: side * side,
         min_side: MIN_SIDE,
+        padding: settings(Domain::Flat)?.patches.padding,
         ..PatchParams::default()
     };
     let layout = charts_of(mesh, &uv, &params)?;

@@ -44,8 +44,10 @@ impl Preset {
             Self::SplineFit => {
                 "[images]\ndomain = \"rectangle\"\n[patches]\ntexel_budget = 1048576\n"
             }
+            // More cones vary less in scale, and one texel of padding is what bilinear interpolation needs: at so few texels each counts.
             Self::GeometryImage256 => {
-                "[images]\ndomain = \"flat\"\nchannels = [\"normal\"]\n[patches]\ntexel_budget = 65536\n"
+                "[cones]\ncount = 16\n[images]\ndomain = \"flat\"\nchannels = [\"normal\"]\n[patches]\n\
+                 texel_budget = 65536\npadding = 1\n"
             }
             Self::Omage1024 => {
                 "[images]\ndomain = \"flat\"\nchannels = [\"normal\"]\n[patches]\n\

@@ -54,8 +54,6 @@ pub(super) struct Divider<'a> {
     params: &'a PatchParams,
     /// Whether nothing but creases divides.
     only_creases: bool,
-    /// A division that may save less is not looked at.
-    least_saved: f64,
 }
 
 /// Space to work in, one a thread.
@@ -103,7 +101,6 @@ impl<'a> Divider<'a> {
             budget: Budget::default(),
             params,
             only_creases: false,
-            least_saved: 0.0,
         }
     }
 
@@ -149,8 +146,6 @@ impl<'a> Divider<'a> {
     /// there is no room for all: then the best comes first.
     fn in_divisions(&mut self, patches: Vec<Vec<FaceId>>) -> Vec<Vec<FaceId>> {
         let mut sum = self.appraise(&patches);
-        // Half of what it must save now: the sum falls.
-        self.least_saved = 0.5 * sum * (1.0 - 10f64.powf(-LEAST_GAIN / 30.0));
         let mut rows = self.best_divisions(patches);
         loop {
             let most = self.params.max_count;
@@ -223,9 +218,8 @@ impl<'a> Divider<'a> {
         }
         let mut tried = vec![tried];
         if !self.only_creases {
-            let most = now - self.least_saved;
-            tried.extend(self.by_lines(&faces, &placement, &outline, most, sets));
-            tried.extend(self.by_scale(&faces, &outline, most, sets));
+            tried.extend(self.by_lines(&faces, &placement, &outline, sets));
+            tried.extend(self.by_scale(&faces, &outline, sets));
         }
         let mut found: Vec<(i64, Division)> = Vec::new();
         for parts in tried {

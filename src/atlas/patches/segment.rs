@@ -164,9 +164,12 @@ pub(super) fn segment(slit: &Slit, range: f64, domain: Domain) -> Vec<Vec<FaceId
         enqueue(&mut queue, sets.components(&rest));
     }
     patches.sort_by_key(|p| p.iter().copied().min());
-    for _ in 0..ROUNDS {
+    for round in 0..ROUNDS {
         let count = patches.len();
         patches = merge(slit, patches, range, &mut own);
+        if round > 0 && patches.len() == count {
+            break;
+        }
         patches = dissolve(slit, patches, range, &mut own);
         if patches.len() == count {
             break;

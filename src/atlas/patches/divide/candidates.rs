@@ -15,11 +15,9 @@ const OFFSET: f64 = 0.3719;
 /// They are estimated by about so many faces.
 const SAMPLE: usize = 16_384;
 /// The best of them that are looked at closely.
-const CANDIDATES: usize = 3;
+const CANDIDATES: usize = 2;
 /// A part with less than this share of the patch's area and of its bend goes to the other side of the line, or of the crease.
 const CRUMB: f64 = 0.02;
-/// Lines are looked at closely that may cost this times what they may: their rectangles are not the smallest ones.
-const SLACK: f64 = 1.1;
 /// Thresholds of scale that are tried lie this far apart, or a little less.
 const SCALE_STEP: f64 = 0.5;
 
@@ -94,19 +92,18 @@ impl Divider<'_> {
         sides
     }
 
-    /// The sides of the lines that promise most, by the rectangles in their direction, and that may cost no more than `most`.
+    /// The sides of the lines that promise most, by the rectangles in their direction.
     pub(super) fn by_lines(
         &self,
         faces: &[FaceId],
         placement: &Placement,
         outline: &Outline,
-        most: f64,
         sets: &mut Sets,
     ) -> Vec<Vec<Vec<FaceId>>> {
         let slit = self.slit;
         // By their numbers, since their order changes with the last digits of scales.
         let every = faces.len() / SAMPLE + 1;
-        let is_sampled = |f: &FaceId| f.index() % every == 0;
+        let is_sampled = |f: &FaceId| f.index().is_multiple_of(every);
         let sampled = faces.iter().copied().filter(is_sampled);
         let sampled = sampled.map(|f| (placement.triangle(slit, f), self.bends.of_face[f]));
         let sampled: Vec<(Triangle, Sums)> = sampled.collect();
@@ -140,7 +137,7 @@ impl Divider<'_> {
             let above = self.running(rows.iter().rev());
             for line in 1..=LINES {
                 let (one, other) = (below[line - 1], above[LINES - line]);
-                if one > 0.0 && other > 0.0 && one + other <= SLACK * most {
+                if one > 0.0 && other > 0.0 {
                     promised.push((rounded_ln(one + other), direction, line));
                 }
             }
@@ -161,38 +158,40 @@ impl Divider<'_> {
         sides.collect()
     }
 
-    /// Connected parts of less scale and of more: a texel is of one width in the plane, so where scale is least the surface is held worst. Where parts that
-    /// filled their rectangles as the patch does would cost more than `most` they are left out.
+    /// Connected parts of less scale and of more, where they promise most if they fill their rectangles as the patch does: a texel is of one width in the
+    /// plane, so where scale is least the surface is held worst.
     pub(super) fn by_scale(
         &self,
         faces: &[FaceId],
         outline: &Outline,
-        most: f64,
         sets: &mut Sets,
-    ) -> Vec<Vec<Vec<FaceId>>> {
+    ) -> Option<Vec<Vec<FaceId>>> {
         let slit = self.slit;
         let scales = faces.iter().map(|&f| slit.log_scale[f]);
         let lowest = scales.fold(f64::INFINITY, f64::min);
         let range = highest(slit, faces) - lowest;
-        let steps = (range / SCALE_STEP).ceil().min(64.0) as usize;
-        let thresholds = (1..steps).map(|i| lowest + range * i as f64 / steps as f64);
-        let thresholds: Vec<f64> = thresholds.collect();
+        let steps = (range / SCALE_STEP).ceil().clamp(1.0, 64.0) as usize;
+        let step = |f: FaceId| {
+            let at = (slit.log_scale[f] - lowest) / range * steps as f64;
+            (at as usize).min(steps - 1)
+        };
+        let mut rows = vec![Sums::default(); steps];
+        for &f in faces {
+            let row = &mut rows[step(f)];
+            *row = row.and(self.bends.of_face[f]);
+        }
         let whole = outline.demand;
-        let sides = thresholds.into_iter().filter_map(|threshold| {
-            let is_below = faces.iter().map(|&f| slit.log_scale[f] <= threshold);
-            let is_below: Vec<bool> = is_below.collect();
-            let cost = |side: bool| {
-                let own = faces.iter().zip(&is_below).filter(|row| *row.1 == side);
-                let sums = own.map(|row| self.bends.of_face[*row.0]);
-                let sums = sums.fold(Sums::default(), Sums::and);
-                let part = (sums.flat / whole.sums.flat).sqrt();
-                let sides = whole.sides.map(|side| side * part);
-                self.cost(&Demand { sums, sides })
-            };
-            let is_promising = cost(false) + cost(true) <= most;
-            is_promising.then(|| self.without_crumbs(faces, &is_below, &whole.sums, sets))
-        });
-        sides.collect()
+        let cost = |rows: &[Sums]| {
+            let sums = rows.iter().copied().fold(Sums::default(), Sums::and);
+            let part = (sums.flat / whole.sums.flat).sqrt();
+            let sides = whole.sides.map(|side| side * part);
+            self.cost(&Demand { sums, sides })
+        };
+        let promise = |&first: &usize| rounded_ln(cost(&rows[..first]) + cost(&rows[first..]));
+        let first = (1..steps).min_by_key(promise)?;
+        let is_below = faces.iter().map(|&f| step(f) < first);
+        let is_below: Vec<bool> = is_below.collect();
+        Some(self.without_crumbs(faces, &is_below, &whole.sums, sets))
     }
 
     /// Cost of the rows so far, for every number of rows.

@@ -37,10 +37,10 @@ impl Divider<'_> {
             for one in changed.drain(..) {
                 for other in self.neighbours(&pieces, one, &label) {
                     let pair = [one.min(other), one.max(other)];
-                    if !saves.contains_key(&pair) {
+                    saves.entry(pair).or_insert_with(|| {
                         let saved = self.saved(&pieces, pair, &label, range, &mut scratch.own);
-                        saves.insert(pair, (saved / sum * 1e9) as i64);
-                    }
+                        (saved / sum * 1e9) as i64
+                    });
                 }
             }
             let best = saves
