@@ -4,21 +4,22 @@
 //! rectangles: each is sampled corner to corner, a full grid without a mask.
 //!
 //! ```text
-//! flat patches → sides and nodes → division → middles → quads → Ricci flow of each → common parameter of walls → harmonic maps
-//! → rectangles glued → charts carried over
+//! flat patches → sides and nodes → short sides contracted, walls drawn anew, division → divided by demand → the same again → middles → quads
+//! → Ricci flow of each → common parameter of walls → maps spread by stretch → rectangles glued → charts carried over → numbers of samples
 //! ```
 //!
-//! Patches with many or hidden corners are divided first (`division`). What has n sides becomes n quads (`quads`); each quad is flattened by
-//! the same flow that made the cone metric, with π/2 at its four corners and nothing else (`flow`); its aspect ratio is its modulus, which
-//! cannot be chosen. The two conformal maps on both sides of a wall stretch it differently: the mean of both is its parameter (`walls`),
-//! and each quad is mapped harmonically to its rectangle with the border so given (`place`). The final triangulation of a quad is not that of the
-//! surface, so the surface is refined once more, and what is linear on its faces is carried over (`lift`).
+//! What has n sides becomes n quads (`quads`), so that what decides about the images is where the walls are: short sides go (`contract`), walls meet at even
+//! angles (`relax`), patches with many or hidden corners are divided (`division`), and those that would hold the surface worst for their texels (`sizes`). Each quad
+//! is flattened by the same flow that made the cone metric, with π/2 at its four corners and nothing else (`flow`); its aspect ratio is its modulus,
+//! which cannot be chosen. The two conformal maps on both sides of a wall stretch it differently, and crowd it at corners: its parameter is its length in
+//! space (`walls`), and each quad is mapped to its rectangle with the border so given, harmonically at first and then so that no part is stretched much more than
+//! the rest (`place`). The final triangulation of a quad is not that of the surface, so the surface is refined once more, and what is linear on its
+//! faces is carried over (`lift`). How the images of even texels bend says how many samples every strip of sides gets (`bends`, `counts`).
 //!
 //! *Guaranteed:* patches are injective, as harmonic maps to convex shapes are; every side of a rectangle is a whole side of its
 //! neighbour, corner to corner, with as many samples (`counts`), and sample i of n from one corner is the same point for both, to the
 //! last bit in the images. Spline patches fitted to two images can so share the control points of their common border.
-//! *Not guaranteed:* conformal maps, though they nearly would be where both sides of every wall agreed; smoothness across walls; a bound for the
-//! log scale inside a rectangle.
+//! *Not guaranteed:* conformal maps; smoothness across walls; a bound for the stretch inside a rectangle; the budget, where the least numbers of samples use more.
 //!
 //! The tutorial shows rectangles for disks only (Fig. 10 and 18, four corners of π/2); quads by joining centres to middles are
 //! E. Catmull, J. Clark, *Recursively generated B-spline surfaces on arbitrary topological meshes* (1978).

@@ -2,12 +2,10 @@
 //!
 //! *Enters:* rectangles whose borders fit. *Leaves:* for every border vertex the fractions of its side before it and behind it.
 //! *Guaranteed:* what is before it for one rectangle is behind it for the other, to the last bit; along a side the fractions rise from 0
-//! to 1. *Not guaranteed:* fractions of the length in space.
+//! to 1.
 //!
-//! The two conformal maps stretch a wall differently, so each rectangle has a length of its own for every edge on it, in parts of
-//! the side. The common one is their mean, and at every vertex so is the sum of those before it. On the surface's border, where there is one
-//! rectangle only, its own lengths stay. What one map crowds at a corner gets half of the room that the other leaves it: the mean is the
-//! better of the two up to a factor of two.
+//! The two conformal maps stretch a wall differently, and where a corner is sharp they leave next to nothing of the image to what lies far from it. So the parameter
+//! is the length in space, whose samples are evenly far apart. Both know it up to rounding, and take the mean.
 
 use super::RectangleError;
 use super::flow::{Piece, Rectangle, sides};
