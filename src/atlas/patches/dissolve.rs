@@ -8,7 +8,8 @@
 
 use super::merge::around;
 use super::overlap::overlap;
-use super::segment::{Placement, TOUCHING, borders, centroid, place};
+use super::placement::{Placement, TOUCHING, centroid, place};
+use super::segment::borders;
 use super::slit::Slit;
 use crate::atlas::plane;
 use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId};

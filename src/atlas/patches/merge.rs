@@ -1,7 +1,8 @@
 //! Neighbouring patches joined while their union is still a disk, injective, and within the range of
 //! log scale. Smallest first, so that crumbs disappear into what surrounds them.
 
-use super::segment::{borders, place, rounded_ln};
+use super::placement::{place, rounded_ln};
+use super::segment::borders;
 use super::slit::Slit;
 use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId};
 use rustc_hash::FxHashSet as Set;

@@ -20,14 +20,17 @@ mod demand;
 mod dissolve;
 mod divide;
 mod given;
+mod holes;
 mod merge;
 mod overlap;
 mod packing;
+mod placement;
 pub(crate) mod raster;
 mod rectangle;
 mod resolution;
 mod seams;
 mod segment;
+mod sets;
 mod slit;
 mod teeth;
 

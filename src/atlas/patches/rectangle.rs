@@ -5,7 +5,7 @@
 //! directions are as good as each other the last digits must not decide. So only hull edges long enough
 //! to have a direction are candidates, beside a fan of fixed ones, and equal areas go to the smallest angle.
 
-use super::segment::{Placement, place};
+use super::placement::{Placement, place};
 use super::slit::Slit;
 use crate::atlas::plane::{Similarity, rotate, rotation, wrap_angle};
 use crate::geometry::ids::FaceId;

@@ -15,106 +15,22 @@
 
 use super::Domain;
 use super::dissolve::{dissolve, widen};
+use super::holes::split_at_holes;
 use super::merge::merge;
-use super::overlap::{Triangle, TriangleIndex, size};
+use super::overlap::Triangle;
+use super::placement::{Placement, centroid, place, rounded_ln};
+use super::sets::{Sets, partition};
 use super::slit::Slit;
-use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId};
+use crate::geometry::ids::{FaceId, FaceVec};
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BTreeSet, BinaryHeap, HashMap, VecDeque};
+use std::collections::{BTreeMap, BinaryHeap};
 
 /// Patches are grown in a window of this part of the allowed range. What is left of it lets them take in the
 /// crumbs at the window's border afterwards, where single faces lie just outside.
 const GROWTH: f64 = 0.9;
 
-/// Two sheets that overlap by no more than this part of the *patch's* extent touch. The chart's extent would
-/// not do: a patch may be a thousandth of it, and what touches there overlaps in the patch.
-pub(super) const TOUCHING: f64 = 1e-10;
-
 /// Rounds of merging and dividing: each can make the other possible again, hardly ever often.
 const ROUNDS: usize = 3;
-
-/// A rounded positive number: equal up to six digits, comparable.
-pub(super) fn rounded_ln(x: f64) -> i64 {
-    (x.max(f64::MIN_POSITIVE).ln() * 1e6).round() as i64
-}
-
-/// Where the faces of a region lie, and what counts as touching there.
-pub(super) struct Placement<'a> {
-    pub positions: &'a [[f64; 2]],
-    /// Diagonal of the faces' bounding box.
-    pub extent: f64,
-}
-
-impl<'a> Placement<'a> {
-    pub fn new(
-        slit: &Slit,
-        positions: &'a [[f64; 2]],
-        faces: impl IntoIterator<Item = FaceId>,
-    ) -> Placement<'a> {
-        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for copy in faces.into_iter().flat_map(|f| slit.copies(f)) {
-            for i in 0..2 {
-                low[i] = low[i].min(positions[copy][i]);
-                high[i] = high[i].max(positions[copy][i]);
-            }
-        }
-        // A set without extent is measured by nothing, but nothing is divided by zero.
-        let extent = crate::atlas::plane::distance(low, high).max(f64::MIN_POSITIVE);
-        Placement { positions, extent }
-    }
-
-    pub fn triangle(&self, slit: &Slit, f: FaceId) -> Triangle {
-        slit.copies(f).map(|c| self.positions[c])
-    }
-
-    pub fn tolerance(&self) -> f64 {
-        TOUCHING * self.extent
-    }
-
-    /// True where no two faces of a disk overlap, of which those with a side on its border are given.
-    ///
-    /// They are enough: where two sheets of a disk overlap the border of one ends, and it crosses the border of the other, since an immersed disk whose border is
-    /// a simple curve is embedded.
-    pub fn is_injective(&self, slit: &Slit, border: &[FaceId]) -> bool {
-        let mut index = self.index(slit, border);
-        border.iter().all(|&f| {
-            let triangle = self.triangle(slit, f);
-            let free = !index.overlaps(&triangle);
-            index.insert(triangle);
-            free
-        })
-    }
-
-    /// An index for triangles as large as those of these faces.
-    pub fn index(&self, slit: &Slit, faces: &[FaceId]) -> TriangleIndex {
-        let sizes = faces
-            .iter()
-            .fold([f64::INFINITY, 0.0f64], |[low, high], &f| {
-                let s = size(&self.triangle(slit, f));
-                [low.min(s), high.max(s)]
-            });
-        TriangleIndex::new(sizes, self.tolerance())
-    }
-}
-
-/// Coordinates of a connected set of faces, central or own as its log scale asks for. `own` is
-/// scratch space, a place a copy.
-pub(super) fn place<'a>(
-    slit: &'a Slit,
-    faces: impl IntoIterator<Item = FaceId>,
-    root: FaceId,
-    highest: f64,
-    member: impl Fn(FaceId) -> bool,
-    own: &'a mut [[f64; 2]],
-) -> Placement<'a> {
-    let positions = if slit.is_deep(highest) {
-        slit.develop(root, member, own);
-        &*own
-    } else {
-        slit.central.as_slice()
-    };
-    Placement::new(slit, positions, faces)
-}
 
 /// Divides the slit disk; every face is in exactly one set. `range` bounds the regional log scale of each.
 pub(super) fn segment(slit: &Slit, range: f64, domain: Domain) -> Vec<Vec<FaceId>> {
@@ -230,10 +146,6 @@ fn sets_area(slit: &Slit, faces: &[FaceId]) -> f64 {
     faces.iter().map(|&f| slit.source_area[f]).sum()
 }
 
-fn partition(faces: &[FaceId], keep: impl Fn(FaceId) -> bool) -> (Vec<FaceId>, Vec<FaceId>) {
-    faces.iter().partition(|&&f| keep(f))
-}
-
 /// The window of log scale of the given length that holds most source area of faces sorted by log scale.
 /// Windows that start whole lengths from the least value are preferred unless they hold much less: the
 /// others leave scraps between them.
@@ -280,128 +192,6 @@ fn best_window(slit: &Slit, sorted: &[FaceId], range: f64) -> [f64; 2] {
     [low, low + range]
 }
 
-/// Sets of faces as stamps, so that membership costs one comparison and nothing is cleared.
-pub(super) struct Sets<'a> {
-    slit: &'a Slit<'a>,
-    stamp: FaceVec<u32>,
-    /// The same for copies.
-    copy_stamp: Vec<u32>,
-    /// Scratch space of [`halves`].
-    sides: FaceVec<u8>,
-    last: u32,
-}
-
-impl<'a> Sets<'a> {
-    pub(super) fn new(slit: &'a Slit<'a>) -> Self {
-        Self {
-            slit,
-            stamp: FaceVec::filled(0, slit.connectivity.face_count()),
-            copy_stamp: vec![0; slit.development.copies],
-            sides: FaceVec::filled(0, slit.connectivity.face_count()),
-            last: 0,
-        }
-    }
-
-    /// True where a face has this stamp.
-    pub(super) fn has(&self, f: FaceId, stamp: u32) -> bool {
-        self.stamp[f] == stamp
-    }
-
-    /// Marks the faces with a new stamp.
-    pub(super) fn mark(&mut self, faces: &[FaceId]) -> u32 {
-        self.last += 1;
-        for &f in faces {
-            self.stamp[f] = self.last;
-        }
-        self.last
-    }
-
-    /// The faces of a set that have a side on its border.
-    pub(super) fn border(&mut self, faces: &[FaceId]) -> Vec<FaceId> {
-        let set = self.mark(faces);
-        let is_inner = |f: FaceId| {
-            let beside = self.slit.neighbours(f);
-            beside.filter(|&n| self.stamp[n] == set).count() == 3
-        };
-        faces.iter().copied().filter(|&f| !is_inner(f)).collect()
-    }
-
-    /// Euler characteristic of a set of faces: 1 for a connected set that is a disk.
-    fn euler_characteristic(&mut self, faces: &[FaceId]) -> i64 {
-        let (slit, set) = (self.slit, self.mark(faces));
-        let (mut copies, mut inner) = (0, 0);
-        for &f in faces {
-            for copy in slit.copies(f) {
-                copies += i64::from(std::mem::replace(&mut self.copy_stamp[copy], set) != set);
-            }
-            inner += slit.neighbours(f).filter(|&n| self.stamp[n] == set).count();
-        }
-        let edges = (3 * faces.len() - inner / 2) as i64;
-        copies - edges + faces.len() as i64
-    }
-
-    /// Connected components on the slit disk, each in the order given, by their first face.
-    pub(super) fn components(&mut self, faces: &[FaceId]) -> Vec<Vec<FaceId>> {
-        let set = self.mark(faces);
-        let first_component = self.last + 1;
-        let mut components: Vec<Vec<FaceId>> = Vec::new();
-        let mut stack = Vec::new();
-        for &f in faces {
-            if self.stamp[f] == set {
-                self.last += 1;
-                components.push(Vec::new());
-                stack.push(f);
-                self.stamp[f] = self.last;
-                while let Some(g) = stack.pop() {
-                    for n in self.slit.neighbours(g) {
-                        if self.stamp[n] == set {
-                            self.stamp[n] = self.last;
-                            stack.push(n);
-                        }
-                    }
-                }
-            }
-            components[(self.stamp[f] - first_component) as usize].push(f);
-        }
-        components
-    }
-
-    /// The face that is most steps from the border of a connected region; the lowest of equals.
-    fn innermost(&mut self, region: &[FaceId]) -> FaceId {
-        let set = self.mark(region);
-        self.last += 1;
-        let seen = self.last;
-        let mut ascending = region.to_vec();
-        ascending.sort();
-        let mut queue: VecDeque<(FaceId, usize)> = VecDeque::new();
-        let (at_border, _) = partition(&ascending, |f| {
-            let inner = self.slit.neighbours(f).filter(|&n| self.stamp[n] == set);
-            inner.count() < 3
-        });
-        for f in at_border {
-            self.stamp[f] = seen;
-            queue.push_back((f, 0));
-        }
-        let mut best = (ascending[0], 0);
-        while let Some((f, steps)) = queue.pop_front() {
-            if steps > best.1 || (steps == best.1 && f < best.0) {
-                best = (f, steps);
-            }
-            for n in self.slit.neighbours(f) {
-                if self.stamp[n] == set {
-                    self.stamp[n] = seen;
-                    queue.push_back((n, steps + 1));
-                }
-            }
-        }
-        best.0
-    }
-}
-
-pub(super) fn centroid(t: &Triangle) -> [f64; 2] {
-    std::array::from_fn(|i| (t[0][i] + t[1][i] + t[2][i]) / 3.0)
-}
-
 /// Faces of a region (those with the stamp, which is taken from some) that lie injectively in the plane, nearest to the seed
 /// first.
 fn grow(
@@ -439,143 +229,6 @@ fn grow(
         }
     }
     grown
-}
-
-/// Cuts a connected injective set into disks along straight lines through its holes.
-pub(super) fn split_at_holes(
-    sets: &mut Sets,
-    faces: Vec<FaceId>,
-    placement: &Placement,
-    disks: &mut Vec<Vec<FaceId>>,
-) {
-    let mut stack = vec![faces];
-    while let Some(faces) = stack.pop() {
-        if sets.euler_characteristic(&faces) == 1 {
-            disks.push(faces);
-            continue;
-        }
-        let centre = largest_hole(sets, &faces, placement);
-        let (left, right) = halves(sets, &faces, centre, placement);
-        let mut parts = sets.components(&left);
-        parts.extend(sets.components(&right));
-        stack.extend(parts);
-    }
-}
-
-/// The middle of the largest hole of a connected injective set that is no disk.
-fn largest_hole(sets: &mut Sets, faces: &[FaceId], placement: &Placement) -> [f64; 2] {
-    let (slit, stamp) = (sets.slit, sets.mark(faces));
-    let c = slit.connectivity;
-    let inner = |h: HalfedgeId| slit.across(h).filter(|&t| sets.stamp[c.face(t)] == stamp);
-    let place = |h: HalfedgeId| placement.positions[slit.development.copy[h] as usize];
-    let mut seen: BTreeSet<HalfedgeId> = BTreeSet::new();
-    let mut cycles: Vec<(f64, [f64; 2])> = Vec::new();
-    let border = faces.iter().flat_map(|&f| c.face_halfedges(f));
-    for start in border.filter(|&h| inner(h).is_none()) {
-        // Walk along the border, and close a simple cycle whenever a copy comes again: a set that
-        // touches itself in a vertex has a hole there too.
-        let mut path: Vec<HalfedgeId> = Vec::new();
-        let mut at: HashMap<u32, usize> = HashMap::new();
-        let mut h = start;
-        while seen.insert(h) {
-            let copy = slit.development.copy[h];
-            if let Some(&from) = at.get(&copy) {
-                cycles.push(area_and_middle(path[from..].iter().map(|&h| place(h))));
-                for h in path.drain(from..) {
-                    at.remove(&slit.development.copy[h]);
-                }
-            }
-            at.insert(copy, path.len());
-            path.push(h);
-            h = c.next(h);
-            while let Some(t) = inner(h) {
-                h = c.next(t);
-            }
-        }
-        if !path.is_empty() {
-            cycles.push(area_and_middle(path.iter().map(|&h| place(h))));
-        }
-    }
-    // The outer border is the largest cycle, the largest hole the second.
-    let unit = placement.extent * placement.extent;
-    cycles.sort_by_key(|cycle| Reverse(rounded_ln(cycle.0.abs() / unit)));
-    let last = cycles.get(1).or(cycles.first());
-    last.map_or([0.0; 2], |cycle| cycle.1)
-}
-
-/// Signed area and mean of the corners of a polygon.
-fn area_and_middle(points: impl ExactSizeIterator<Item = [f64; 2]> + Clone) -> (f64, [f64; 2]) {
-    let n = points.len().max(1) as f64;
-    let sum = points
-        .clone()
-        .fold([0.0; 2], |s, p| [s[0] + p[0], s[1] + p[1]]);
-    let middle = sum.map(|s| s / n);
-    let relative: Vec<[f64; 2]> = points
-        .map(|p| [p[0] - middle[0], p[1] - middle[1]])
-        .collect();
-    let doubled: f64 = (0..relative.len())
-        .map(|i| {
-            let (p, q) = (relative[i], relative[(i + 1) % relative.len()]);
-            p[0] * q[1] - p[1] * q[0]
-        })
-        .sum();
-    (0.5 * doubled, middle)
-}
-
-/// Directions of the lines that are tried through a hole.
-const DIRECTIONS: usize = 8;
-
-/// The faces on both sides of the line through a point that cuts the shortest way, of eight directions.
-fn halves(
-    sets: &mut Sets,
-    faces: &[FaceId],
-    centre: [f64; 2],
-    placement: &Placement,
-) -> (Vec<FaceId>, Vec<FaceId>) {
-    let slit = sets.slit;
-    let stamp = sets.mark(faces);
-    let directions: [[f64; 2]; DIRECTIONS] = std::array::from_fn(|i| {
-        // An offset that no regular grid has for a direction.
-        let angle = std::f64::consts::PI * i as f64 / DIRECTIONS as f64 + 0.1234;
-        [angle.cos(), angle.sin()]
-    });
-    // A bit a line, set for the faces on its left.
-    let tolerance = placement.tolerance();
-    let mut count = [0; DIRECTIONS];
-    for &f in faces {
-        let p = centroid(&placement.triangle(slit, f));
-        let p = [p[0] - centre[0], p[1] - centre[1]];
-        let mut sides = 0;
-        for (i, d) in directions.iter().enumerate() {
-            let is_left = d[0] * p[1] - d[1] * p[0] > -tolerance;
-            sides |= u8::from(is_left) << i;
-            count[i] += usize::from(is_left);
-        }
-        sets.sides[f] = sides;
-    }
-    let mut cut = [0.0; DIRECTIONS];
-    for &f in faces {
-        for h in slit.connectivity.face_halfedges(f) {
-            let Some(n) = slit.beside(h) else { continue };
-            // Hardly any two neighbours have a line between them.
-            let between = sets.sides[f] & !sets.sides[n];
-            if between != 0 && sets.stamp[n] == stamp {
-                for (i, cut) in cut.iter_mut().enumerate() {
-                    if between >> i & 1 == 1 {
-                        *cut += slit.length[slit.connectivity.edge(h)];
-                    }
-                }
-            }
-        }
-    }
-    let best = (0..DIRECTIONS)
-        .filter(|&i| count[i] > 0 && count[i] < faces.len())
-        .min_by_key(|&i| (rounded_ln(cut[i] / placement.extent), i));
-    match best {
-        Some(i) => partition(faces, |f| sets.sides[f] >> i & 1 == 1),
-        // No line through the point divides them: take off one face, which is a disk.
-        None => (faces[..1].to_vec(), faces[1..].to_vec()),
-    }
 }
 
 /// Border length in space between a patch and each of its neighbours on the slit disk.

@@ -8,7 +8,7 @@
 
 use super::merge::Part;
 use super::overlap::{Triangle, TriangleIndex};
-use super::segment::Placement;
+use super::placement::Placement;
 use super::slit::Slit;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec};
 

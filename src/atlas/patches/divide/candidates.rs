@@ -3,7 +3,8 @@
 use super::{Divider, Outline, highest};
 use crate::atlas::patches::demand::{Demand, Sums};
 use crate::atlas::patches::overlap::Triangle;
-use crate::atlas::patches::segment::{Placement, Sets, centroid, rounded_ln};
+use crate::atlas::patches::placement::{Placement, centroid, rounded_ln};
+use crate::atlas::patches::sets::Sets;
 use crate::geometry::ids::{FaceId, FaceVec, NONE};
 use std::collections::VecDeque;
 

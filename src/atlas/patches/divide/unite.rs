@@ -3,7 +3,7 @@
 //! The pair that saves most comes first. A union is a disk, injective and within the range of log scale, as all patches are.
 
 use super::super::merge::{Part, joins_to_a_disk, overlaps, within};
-use super::super::segment::place;
+use super::super::placement::place;
 use super::{Divider, Outline, Scratch};
 use crate::atlas::patches::demand::Sums;
 use crate::geometry::ids::{FaceId, FaceVec};

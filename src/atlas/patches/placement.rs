@@ -1,0 +1,136 @@
+//! Where the faces of a region lie in the plane, and whether any of them overlap.
+
+use super::overlap::{Triangle, TriangleIndex, size};
+use super::slit::Slit;
+use crate::geometry::ids::FaceId;
+
+/// Two sheets that overlap by no more than this part of the *patch's* extent touch. The chart's extent would
+/// not do: a patch may be a thousandth of it, and what touches there overlaps in the patch.
+pub(super) const TOUCHING: f64 = 1e-10;
+
+/// A rounded positive number: equal up to six digits, comparable.
+pub(super) fn rounded_ln(x: f64) -> i64 {
+    (x.max(f64::MIN_POSITIVE).ln() * 1e6).round() as i64
+}
+
+pub(super) fn centroid(t: &Triangle) -> [f64; 2] {
+    std::array::from_fn(|i| (t[0][i] + t[1][i] + t[2][i]) / 3.0)
+}
+
+/// Where the faces of a region lie, and what counts as touching there.
+pub(super) struct Placement<'a> {
+    pub positions: &'a [[f64; 2]],
+    /// Diagonal of the faces' bounding box.
+    pub extent: f64,
+}
+
+impl<'a> Placement<'a> {
+    pub fn new(
+        slit: &Slit,
+        positions: &'a [[f64; 2]],
+        faces: impl IntoIterator<Item = FaceId>,
+    ) -> Placement<'a> {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for copy in faces.into_iter().flat_map(|f| slit.copies(f)) {
+            for i in 0..2 {
+                low[i] = low[i].min(positions[copy][i]);
+                high[i] = high[i].max(positions[copy][i]);
+            }
+        }
+        // A set without extent is measured by nothing, but nothing is divided by zero.
+        let extent = crate::atlas::plane::distance(low, high).max(f64::MIN_POSITIVE);
+        Placement { positions, extent }
+    }
+
+    pub fn triangle(&self, slit: &Slit, f: FaceId) -> Triangle {
+        slit.copies(f).map(|c| self.positions[c])
+    }
+
+    pub fn tolerance(&self) -> f64 {
+        TOUCHING * self.extent
+    }
+
+    /// True where no two faces of a disk overlap, of which those with a side on its border are given.
+    ///
+    /// They are enough: where two sheets of a disk overlap the border of one ends, and it crosses the border of the other, since an immersed disk whose border is
+    /// a simple curve is embedded.
+    pub fn is_injective(&self, slit: &Slit, border: &[FaceId]) -> bool {
+        let mut index = self.index(slit, border);
+        border.iter().all(|&f| {
+            let triangle = self.triangle(slit, f);
+            let free = !index.overlaps(&triangle);
+            index.insert(triangle);
+            free
+        })
+    }
+
+    /// An index for triangles as large as those of these faces.
+    pub fn index(&self, slit: &Slit, faces: &[FaceId]) -> TriangleIndex {
+        let sizes = faces
+            .iter()
+            .fold([f64::INFINITY, 0.0f64], |[low, high], &f| {
+                let s = size(&self.triangle(slit, f));
+                [low.min(s), high.max(s)]
+            });
+        TriangleIndex::new(sizes, self.tolerance())
+    }
+}
+
+/// Coordinates of a connected set of faces, central or own as its log scale asks for. `own` is
+/// scratch space, a place a copy.
+pub(super) fn place<'a>(
+    slit: &'a Slit,
+    faces: impl IntoIterator<Item = FaceId>,
+    root: FaceId,
+    highest: f64,
+    member: impl Fn(FaceId) -> bool,
+    own: &'a mut [[f64; 2]],
+) -> Placement<'a> {
+    let positions = if slit.is_deep(highest) {
+        slit.develop(root, member, own);
+        &*own
+    } else {
+        slit.central.as_slice()
+    };
+    Placement::new(slit, positions, faces)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::overlap::overlap;
+    use super::super::samples::strip;
+    use super::super::sets::Sets;
+    use super::*;
+    use std::f64::consts::TAU;
+
+    /// The border decides like all pairs of faces.
+    #[test]
+    fn the_border_shows_whether_a_disk_overlaps_itself() {
+        let mut answers = Vec::new();
+        for turns in [0.3, 0.8, 0.97, 1.03, 1.2, 2.5] {
+            let wound = |s: f64, t: f64| {
+                let (sin, cos) = (TAU * turns * s).sin_cos();
+                [(1.0 + t) * cos, (1.0 + t) * sin]
+            };
+            let s = strip(60, 6, |s, t| [s, t, 0.0], wound, [0.0; 2]);
+            let slit = Slit::new(&s.mesh, &s.length, &s.cut, &s.development, None);
+            let faces: Vec<FaceId> = s.mesh.connectivity.faces().collect();
+            let placement = Placement::new(&slit, &slit.central, faces.iter().copied());
+            let border = Sets::new(&slit).border(&faces);
+            assert!(border.len() < faces.len() / 2);
+            let corners = |f: FaceId| placement.triangle(&slit, f);
+            let pairs = (0..faces.len()).flat_map(|i| (0..i).map(move |j| [i, j]));
+            let overlaps = |[i, j]: [usize; 2]| {
+                overlap(
+                    &corners(faces[i]),
+                    &corners(faces[j]),
+                    placement.tolerance(),
+                )
+            };
+            let brute = !pairs.into_iter().any(overlaps);
+            assert_eq!(placement.is_injective(&slit, &border), brute, "{turns}");
+            answers.push(brute);
+        }
+        assert_eq!(answers, [true, true, true, false, false, false]);
+    }
+}
