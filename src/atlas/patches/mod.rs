@@ -16,6 +16,7 @@
 //! a domain that does not.
 
 mod bend;
+mod coverage;
 mod demand;
 mod dissolve;
 mod divide;

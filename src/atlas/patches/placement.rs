@@ -2,7 +2,7 @@
 
 use super::overlap::{Triangle, TriangleIndex, size};
 use super::slit::Slit;
-use crate::geometry::ids::FaceId;
+use crate::geometry::ids::{FaceId, HalfedgeId};
 
 /// Two sheets that overlap by no more than this part of the *patch's* extent touch. The chart's extent would
 /// not do: a patch may be a thousandth of it, and what touches there overlaps in the patch.
@@ -44,6 +44,12 @@ impl<'a> Placement<'a> {
 
     pub fn triangle(&self, slit: &Slit, f: FaceId) -> Triangle {
         slit.copies(f).map(|c| self.positions[c])
+    }
+
+    /// The ends of a halfedge.
+    pub fn side(&self, slit: &Slit, h: HalfedgeId) -> [[f64; 2]; 2] {
+        let c = slit.connectivity;
+        [h, c.next(h)].map(|h| self.positions[slit.development.copy[h] as usize])
     }
 
     pub fn tolerance(&self) -> f64 {
@@ -98,21 +104,16 @@ pub(super) fn place<'a>(
 #[cfg(test)]
 mod tests {
     use super::super::overlap::overlap;
-    use super::super::samples::strip;
+    use super::super::samples::wound;
     use super::super::sets::Sets;
     use super::*;
-    use std::f64::consts::TAU;
 
     /// The border decides like all pairs of faces.
     #[test]
     fn the_border_shows_whether_a_disk_overlaps_itself() {
         let mut answers = Vec::new();
         for turns in [0.3, 0.8, 0.97, 1.03, 1.2, 2.5] {
-            let wound = |s: f64, t: f64| {
-                let (sin, cos) = (TAU * turns * s).sin_cos();
-                [(1.0 + t) * cos, (1.0 + t) * sin]
-            };
-            let s = strip(60, 6, |s, t| [s, t, 0.0], wound, [0.0; 2]);
+            let s = wound(60, 6, turns, 1.0);
             let slit = Slit::new(&s.mesh, &s.length, &s.cut, &s.development, None);
             let faces: Vec<FaceId> = s.mesh.connectivity.faces().collect();
             let placement = Placement::new(&slit, &slit.central, faces.iter().copied());

@@ -116,3 +116,12 @@ pub(crate) fn ramp(columns: usize, rows: usize, depth: f64) -> Sample {
         [1.0, -2.0],
     )
 }
+
+/// A strip wound around a point so many times, clockwise; as thick as said where the inner radius is 1.
+pub(crate) fn wound(columns: usize, rows: usize, turns: f64, thickness: f64) -> Sample {
+    let place = |s: f64, t: f64| {
+        let (sin, cos) = (-std::f64::consts::TAU * turns * s).sin_cos();
+        [(1.0 + thickness * t) * cos, (1.0 + thickness * t) * sin]
+    };
+    strip(columns, rows, |s, t| [s, t, 0.0], place, [0.0; 2])
+}

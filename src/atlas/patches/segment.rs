@@ -14,6 +14,7 @@
 //! last digits of the metric does not change the patches.
 
 use super::Domain;
+use super::coverage::Coverage;
 use super::dissolve::{dissolve, widen};
 use super::holes::split_at_holes;
 use super::merge::merge;
@@ -117,10 +118,13 @@ fn cover(
         let scales = region.iter().map(|&f| slit.log_scale[f]);
         let highest = scales.fold(f64::MIN, f64::max);
         let seed = sets.innermost(&region);
+        let border = sets.sides(&region);
         let stamp = sets.mark(&region);
         let member = |f| sets.stamp[f] == stamp;
         let placement = place(slit, region.iter().copied(), seed, highest, member, own);
-        let grown = grow(sets, &region, seed, stamp, &placement);
+        let border: Vec<_> = border.iter().map(|&h| placement.side(slit, h)).collect();
+        let coverage = Coverage::new(region.len(), &border);
+        let grown = grow(sets, &region, seed, stamp, &placement, &coverage);
         let stamp = sets.mark(&grown);
         let left_over = region.iter().filter(|&&f| sets.stamp[f] != stamp);
         rest.extend(left_over.copied());
@@ -200,6 +204,7 @@ fn grow(
     seed: FaceId,
     stamp: u32,
     placement: &Placement,
+    coverage: &Coverage,
 ) -> Vec<FaceId> {
     let slit = sets.slit;
     let mut index = placement.index(slit, region);
@@ -215,11 +220,13 @@ fn grow(
     let mut grown = Vec::new();
     while let Some(Reverse((_, f))) = queue.pop() {
         let triangle = placement.triangle(slit, f);
-        // What overlaps now will always: the patch only grows.
-        if index.overlaps(&triangle) {
-            continue;
+        if !coverage.is_single(&triangle) {
+            // What overlaps now will always: the patch only grows.
+            if index.overlaps(&triangle) {
+                continue;
+            }
+            index.insert(triangle);
         }
-        index.insert(triangle);
         grown.push(f);
         for n in slit.neighbours(f) {
             if sets.stamp[n] == stamp {

@@ -1,7 +1,7 @@
 //! Sets of faces of the slit disk: membership, components, borders.
 
 use super::slit::Slit;
-use crate::geometry::ids::{FaceId, FaceVec};
+use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId};
 use std::collections::VecDeque;
 
 /// Sets of faces as stamps, so that membership costs one comparison and nothing is cleared.
@@ -48,6 +48,16 @@ impl<'a> Sets<'a> {
             beside.filter(|&n| self.stamp[n] == set).count() == 3
         };
         faces.iter().copied().filter(|&f| !is_inner(f)).collect()
+    }
+
+    /// The halfedges on the border of a set of faces, with the set on their left.
+    pub(super) fn sides(&mut self, faces: &[FaceId]) -> Vec<HalfedgeId> {
+        let set = self.mark(faces);
+        let slit = self.slit;
+        let all = faces.iter();
+        let all = all.flat_map(|&f| slit.connectivity.face_halfedges(f));
+        let is_outer = |&h: &HalfedgeId| slit.beside(h).is_none_or(|g| self.stamp[g] != set);
+        all.filter(is_outer).collect()
     }
 
     /// Euler characteristic of a set of faces: 1 for a connected set that is a disk.
