@@ -232,9 +232,15 @@ impl GeometryImage {
     fn set(&mut self, at: usize, f: FaceId, corners: &Corners, weights: [f64; 3]) {
         let normal = mix(&corners.normal, weights);
         self.position[at] = mix(&corners.position, weights).map(|x| x as f32);
-        self.normal[at] = unit(normal)
-            .unwrap_or(corners.face_normal)
-            .map(|x| x as f32);
+        // A mean of unit normals: its square neither overflows nor, where it is of any use, underflows.
+        let square: f64 = normal.iter().map(|x| x * x).sum();
+        let normal = if square > f64::MIN_POSITIVE {
+            let length = square.sqrt();
+            normal.map(|x| x / length)
+        } else {
+            corners.face_normal
+        };
+        self.normal[at] = normal.map(|x| x as f32);
         self.face[at] = f.raw();
         self.log_scale[at] = mix(&corners.log_scale.map(|s| [s]), weights)[0] as f32;
     }
