@@ -1,5 +1,7 @@
 //! Rectangles of small surfaces: common parameters of walls, and maps without folds.
 
+mod drawing;
+
 use super::flow::Rectangle;
 use super::quads::{Quad, quads};
 use super::sides::Drawing;
@@ -28,7 +30,7 @@ fn shaken(mut mesh: Mesh) -> Mesh {
 }
 
 /// One patch, slit to cones and borders.
-fn drawn(mesh: &Mesh, cones: &[usize]) -> (Subdivision, Vec<Quad>) {
+fn undivided(mesh: &Mesh, cones: &[usize]) -> Drawing {
     let c = &mesh.connectivity;
     let mut target = VertexVec::filled(0.0, c.vertex_count());
     for &v in cones {
@@ -37,7 +39,11 @@ fn drawn(mesh: &Mesh, cones: &[usize]) -> (Subdivision, Vec<Quad>) {
     let prescription = Prescription::new(target, BoundaryCondition::Free);
     let cut = cut(c, &lengths(mesh), &prescription).unwrap();
     let face_patch = FaceVec::filled(PatchId::new(0), c.face_count());
-    let mut drawing = Drawing::new(mesh, &cut.is_cut, &face_patch).unwrap();
+    Drawing::new(mesh, &cut.is_cut, &face_patch).unwrap()
+}
+
+fn drawn(mesh: &Mesh, cones: &[usize]) -> (Subdivision, Vec<Quad>) {
+    let mut drawing = undivided(mesh, cones);
     division::divide(&mut drawing).unwrap();
     drawing.mark_middles();
     let quads = quads(&mut drawing).unwrap();
