@@ -33,14 +33,14 @@ impl Coverage {
         let mut grid = Self {
             low,
             per_unit,
-            size: sides.map(|side| (side * per_unit) as usize + 1),
+            size: [0, 0],
             is_single: Vec::new(),
         };
         // Without extent there is nothing to tell.
         if !per_unit.is_finite() || per_unit <= 0.0 {
-            grid.size = [0, 0];
             return grid;
         }
+        grid.size = sides.map(|side| (side * per_unit) as usize + 1);
         grid.is_single = grid.winding(border).iter().map(|&n| n == 1).collect();
         for side in border {
             let [xs, ys] = grid.cells(side);
@@ -149,7 +149,12 @@ mod tests {
 
     #[test]
     fn without_extent_nothing_is_known() {
-        for border in [&[][..], &[[[1.0, 2.0]; 2]], &[[[0.0, 0.0], [1.0, 0.0]]]] {
+        for border in [
+            &[][..],
+            &[[[1.0, 2.0]; 2]],
+            &[[[0.0, 0.0], [1.0, 0.0]]],
+            &[[[0.0, 0.0], [1e-310, 0.0]]],
+        ] {
             let coverage = Coverage::new(5, border);
             assert!(!coverage.is_single(&[[0.1, 0.0], [0.2, 0.0], [0.1, 0.1]]));
         }

@@ -22,7 +22,7 @@ use super::overlap::Triangle;
 use super::placement::{Placement, place};
 use super::rectangle::smallest;
 use super::resolution::coarsest;
-use super::sets::Sets;
+use super::sets::{Sets, in_order};
 use super::slit::Slit;
 use super::teeth::trim;
 use crate::atlas::plane::wrap_angle;
@@ -58,7 +58,7 @@ pub(super) struct Divider<'a> {
     only_creases: bool,
 }
 
-/// Space to work in, one a thread.
+/// Space to work in, for one patch at a time. What is not touched takes no memory.
 pub(super) struct Scratch<'a> {
     sets: Sets<'a>,
     /// Of [`Divider::by_creases`].
@@ -75,15 +75,6 @@ impl<'a> Scratch<'a> {
             own: vec![[0.0; 2]; slit.development.copies],
         }
     }
-}
-
-/// Faces of every patch ascending, patches by their first face.
-fn in_order(mut patches: Vec<Vec<FaceId>>) -> Vec<Vec<FaceId>> {
-    for patch in &mut patches {
-        patch.sort();
-    }
-    patches.sort_by_key(|p| p.first().copied());
-    patches
 }
 
 impl Division {

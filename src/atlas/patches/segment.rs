@@ -20,7 +20,7 @@ use super::holes::split_at_holes;
 use super::merge::merge;
 use super::overlap::Triangle;
 use super::placement::{Placement, centroid, place, rounded_ln};
-use super::sets::{Sets, partition};
+use super::sets::{Sets, in_order, partition};
 use super::slit::Slit;
 use crate::geometry::ids::{FaceId, FaceVec};
 use std::cmp::Reverse;
@@ -93,15 +93,10 @@ pub(super) fn segment(slit: &Slit, range: f64, domain: Domain) -> Vec<Vec<FaceId
         }
     }
     // A small flat image costs less than the ragged border that a crumb leaves in its neighbours.
-    let mut patches = match domain {
+    in_order(match domain {
         Domain::Flat => patches,
         Domain::Rectangle => widen(slit, patches, range, &mut own),
-    };
-    for patch in &mut patches {
-        patch.sort();
-    }
-    patches.sort_by_key(|p| p.first().copied());
-    patches
+    })
 }
 
 /// Covers a connected region by disks, each injective at its own extent, and puts what is left over into `rest`.

@@ -139,3 +139,12 @@ pub(super) fn partition(
 ) -> (Vec<FaceId>, Vec<FaceId>) {
     faces.iter().partition(|&&f| keep(f))
 }
+
+/// Faces of every patch ascending, patches by their first face.
+pub(super) fn in_order(mut patches: Vec<Vec<FaceId>>) -> Vec<Vec<FaceId>> {
+    for patch in &mut patches {
+        patch.sort();
+    }
+    patches.sort_by_key(|p| p.first().copied());
+    patches
+}
