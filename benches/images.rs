@@ -1,8 +1,8 @@
 //! How well geometry images hold a surface, at equal total texels: ours in both domains, beside the same sampler on the atlases of other programs.
 //!
-//! `cargo bench --bench images -- [--peers DIR] [--flat] MESH…`: 128², 256² and 512² texels in all images together, their margins included. DIR holds
+//! `cargo bench --bench images -- [--peers DIR] [--flat | --rect] MESH…`: 128², 256² and 512² texels in all images together, their margins included. DIR holds
 //! `NAME.TOOL.obj`, the mesh with the texture coordinates of a tool, as `benches/peers/atlases.py` writes them. PSNR is
-//! 20 log10(diagonal / symmetric RMS distance) of the mesh that is rebuilt from images and seam samples. `--flat` leaves rectangles out. Flat images are those of
+//! 20 log10(diagonal / symmetric RMS distance) of the mesh that is rebuilt from images and seam samples. `--flat` leaves rectangles out, `--rect` flat images. Flat images are those of
 //! `preset = "geometry-image-256"`, and charts of other programs get its padding too. Nothing here is timed.
 
 mod common;
@@ -35,6 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         match argument.as_str() {
             "--peers" => peers = Some(arguments.next().ok_or("--peers needs a folder")?.into()),
             "--flat" => domains = vec![Domain::Flat],
+            "--rect" => domains = vec![Domain::Rectangle],
             // What cargo adds.
             "--bench" => {}
             _ => meshes.push(argument.into()),

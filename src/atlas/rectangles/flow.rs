@@ -41,6 +41,9 @@ pub(super) struct Rectangle {
     pub layout: Layout,
     /// Where on it the vertices lie that the flow left.
     pub carrier: VertexVec<Carrier>,
+    /// How densely it is to be sampled at the vertices of the layout, in units of the mean: evenly, as long as nothing else is asked for. See
+    /// [`density`](super::density).
+    pub density: VertexVec<f64>,
 }
 
 /// An edge on the border of a rectangle.
@@ -163,6 +166,7 @@ pub(super) fn flatten(
         origin: shape.origin,
         unequal: shape.unequal,
         carrier: carrier.collect(),
+        density: VertexVec::filled(1.0, layout.connectivity.vertex_count()),
         layout,
         fine: Subdivision {
             corner,

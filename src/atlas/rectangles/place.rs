@@ -113,7 +113,8 @@ pub(super) fn place_in_rounds(
     }
 }
 
-/// How much larger than its place in the unit square a rectangle's surface is: the mean squared length of what is a unit long there.
+/// How much larger than its place in the unit square a rectangle's surface is: the mean squared length of what is a unit long there,
+/// with a weight where it is to be sampled densely.
 struct Stretch {
     /// At the vertices of the flat triangulation; 1 on the mean.
     at: VertexVec<f64>,
@@ -133,7 +134,13 @@ impl Stretch {
             let area = 0.5 * norm(cross(sub(p[1], p[0]), sub(p[2], p[0])));
             let uv = corners.map(|v| at[v].unwrap_or_default());
             let uv = uv.map(|[u, v]| [u, v / rectangle.height]);
-            let squared = squared_stretch(p, uv);
+            // With a weight d⁴ the sum of squares is least where d times the stretch is the same everywhere, since the surface's images, 1 / stretch² an area, have
+            // one size in all.
+            let densities = corners.map(|v| rectangle.density.as_slice().get(v.index()));
+            let known = || densities.iter().flatten().map(|d| d.powi(4));
+            let weight = known().sum::<f64>() / known().count().max(1) as f64;
+            let weight = if weight > 0.0 { weight } else { 1.0 };
+            let squared = weight * squared_stretch(p, uv);
             if !(area > 0.0 && squared.is_finite()) {
                 continue;
             }

@@ -1,5 +1,6 @@
 //! Rectangles of small surfaces: common parameters of walls, and maps without folds.
 
+mod density;
 mod drawing;
 
 use super::flow::Rectangle;
@@ -212,7 +213,8 @@ fn assert_a_rectangle(name: &str, rectangle: &Rectangle) {
 #[test]
 fn no_face_is_flipped_and_corners_stay() {
     for (name, (fine, quads)) in surfaces() {
-        let (rectangles, _) = placed(&fine, &quads, TOLERANCE).unwrap();
+        let bend = FaceVec::filled(1.0, fine.connectivity.face_count());
+        let (rectangles, _) = placed(&fine, &bend, &quads, TOLERANCE).unwrap();
         assert!(rectangles.len() >= 3, "{name}");
         for rectangle in &rectangles {
             assert_a_rectangle(name, rectangle);

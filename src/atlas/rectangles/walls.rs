@@ -5,7 +5,7 @@
 //! to 1.
 //!
 //! The two conformal maps stretch a wall differently, and where a corner is sharp they leave next to nothing of the image to what lies far from it. So the parameter
-//! is the length in space, whose samples are evenly far apart. Both know it up to rounding, and take the mean.
+//! is the length in space, and where a rectangle is to be sampled densely ([`density`](super::density)) as much more: both take the mean.
 
 use super::RectangleError;
 use super::flow::{Piece, Rectangle, sides};
@@ -95,17 +95,27 @@ fn join(
     Ok(())
 }
 
-/// The lengths of a side's pieces, in parts of it.
+/// The lengths of a side's pieces times the density there, in parts of it.
 fn parts(rectangles: &[Rectangle], side: &Side) -> Vec<f64> {
     let pieces = &rectangles[side.rectangle].border[side.pieces.clone()];
     let r = &rectangles[side.rectangle];
-    let length = |piece: &Piece| {
-        let ends = r.fine.connectivity.edge_vertices(piece.edge);
+    let c = &r.fine.connectivity;
+    let density = |v: VertexId| r.density.as_slice().get(v.index()).copied();
+    // A side begins at a vertex of the flow; those that were added later are as dense as the one before.
+    let mut last = 1.0;
+    let mut weighted = |piece: &Piece| {
+        let h = c.edge_halfedge(piece.edge);
+        let ends = [c.tail(h), c.head(h)];
         let [p, q] = ends.map(|v| r.fine.position[v]);
-        distance(p, q)
+        let [before, behind] = ends.map(|v| {
+            last = density(v).unwrap_or(last);
+            last
+        });
+        distance(p, q) * (before * behind).sqrt()
     };
-    let whole: f64 = pieces.iter().map(length).sum();
-    pieces.iter().map(|piece| length(piece) / whole).collect()
+    let lengths: Vec<f64> = pieces.iter().map(&mut weighted).collect();
+    let whole: f64 = lengths.iter().sum();
+    lengths.iter().map(|length| length / whole).collect()
 }
 
 /// Where pieces begin. Sums are taken from the nearer end, so that small ones keep their digits there, and the same for both directions.
