@@ -8,6 +8,7 @@ mod cli;
 use affine_atlas::config::Config;
 use affine_atlas::config::assets::Asset;
 use affine_atlas::export::folder::remove_all_staging;
+use affine_atlas::export::index;
 use affine_atlas::export::manifest::{Manifest, Record};
 use affine_atlas::job::fit::FitParams;
 use affine_atlas::job::rebuild::RebuildAssetError;
@@ -54,7 +55,8 @@ fn record(output: &Path, config: &Config, outcomes: &[AssetOutcome]) -> Result<(
     for outcome in outcomes {
         manifest.insert(Record::of(outcome, &config_hash));
     }
-    manifest.save(output).map_err(failure)
+    manifest.save(output).map_err(failure)?;
+    index::write(output, &manifest).map_err(failure)
 }
 
 fn inspect(asset: &Asset, config: &Config) -> Result<Inspection, Failure> {

@@ -26,9 +26,9 @@ use crate::atlas::rectangles::Charted;
 use crate::atlas::{charts, develop, geometry_image, patches, rectangles};
 use crate::config::{Config, PatchParams};
 use crate::export::folder::{Staging, component_name, list_files};
-use crate::export::{self, ExportError, Provenance, pictures};
+use crate::export::{self, ExportError, Provenance, pictures, report as report_page};
 use crate::flow::cones::{self, Requests};
-use crate::geometry::deviation::Triangles;
+use crate::geometry::deviation::{Triangles, distances};
 use crate::geometry::mesh::Soup;
 use crate::observe::Observer;
 use crate::outcome::{AssetOutcome, AssetState, ComponentOutcome, Failure, Summary};
@@ -165,11 +165,22 @@ fn build_component(
         faces: &given_faces,
     };
     let readable = Images::new(&patches, &images, image_origin);
-    let quality = report::measure_images(quality, given, &readable, topology);
+    let (quality, rebuilt) = report::measure_images(quality, given, &readable, topology);
+    let image_distance = rebuilt
+        .filter(|_| config.report.enabled)
+        .and_then(|rebuilt| {
+            let rebuilt = Triangles {
+                positions: &rebuilt.positions,
+                faces: &rebuilt.faces,
+            };
+            distances(mesh.positions.as_slice(), rebuilt)
+        });
     Ok(AffineAtlas {
         topology,
         seamless: report::is_seamless(&charts),
         repair: component.log.counts(),
+        repair_log: component.log,
+        image_distance: image_distance.map(Into::into),
         flow: config.flow.clone(),
         mesh,
         prescription,
@@ -334,6 +345,10 @@ fn write(
         go_on()?;
         if config.pictures.enabled {
             pictures::write(&staging, &subfolder, atlas, config.pictures.size)?;
+        }
+        go_on()?;
+        if config.report.enabled {
+            report_page::write(&staging, &subfolder, atlas, &provenance, &config.report)?;
         }
         go_on()?;
     }
