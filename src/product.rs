@@ -64,7 +64,7 @@ impl AffineAtlas {
 }
 
 /// What connectivity repair changed (tutorial 5.3).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ConnectivityRepair {
     /// Edge and face splits.
     pub splits: usize,
@@ -75,7 +75,7 @@ pub struct ConnectivityRepair {
 }
 
 /// Minimum, maximum and standard deviation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Spread {
     /// Least value.
     pub min: f64,
@@ -86,7 +86,7 @@ pub struct Spread {
 }
 
 /// Mean and maximum.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct MeanMax {
     /// Mean, weighted by source area.
     pub mean: f64,
@@ -95,7 +95,7 @@ pub struct MeanMax {
 }
 
 /// How well the atlas turned out.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Quality {
     /// (9), both areas normalised to 1.
     pub area_distortion: f64,

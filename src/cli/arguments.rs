@@ -84,10 +84,19 @@ pub enum Command {
     /// Lay a repeating image over the whole surface as one texture
     #[command(after_help = TEXTURE_EXAMPLES, after_long_help = TEXTURE_EXAMPLES)]
     Texture(Texture),
+    /// Print a JSON schema of what is written, or of the configuration
+    #[command(after_help = SCHEMA_EXAMPLES, after_long_help = SCHEMA_EXAMPLES)]
+    Schema(Schema),
     /// Write a configuration file that explains every key
     #[command(after_help = INIT_EXAMPLES, after_long_help = INIT_EXAMPLES)]
     Init(Init),
 }
+
+const SCHEMA_EXAMPLES: &str = "\
+Examples:
+  affine-atlas schema config > config.schema.json     for editors that complete TOML
+  affine-atlas schema atlas                           of atlas.json
+  affine-atlas schema manifest                        of each line of manifest.jsonl";
 
 const BUILD_EXAMPLES: &str = "\
 Examples:
@@ -320,6 +329,25 @@ pub struct Init {
     /// Replace an existing file
     #[arg(long)]
     pub force: bool,
+}
+
+/// What to print.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct Schema {
+    /// Which file
+    #[arg(value_name = "FILE", value_enum)]
+    pub of: SchemaOf,
+}
+
+/// What there are schemas of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SchemaOf {
+    /// atlas.json
+    Atlas,
+    /// a line of manifest.jsonl
+    Manifest,
+    /// config.toml
+    Config,
 }
 
 #[cfg(test)]

@@ -143,6 +143,12 @@ fn page(
     }
     let _ = writeln!(
         body,
+        "<p class=\"soft\">Input <code>{}</code>, configuration <code>{}</code> (BLAKE3).</p>",
+        escape(&document.source.blake3),
+        escape(&document.source.config_blake3)
+    );
+    let _ = writeln!(
+        body,
         "<p class=\"soft\">Lengths are in the units of the mesh file, angles in radians. Faces and vertices are rows of <code>atlas.npz</code> unless they are said to be of the file.</p>"
     );
     if let Some(drawing) = &drawing {
@@ -183,12 +189,6 @@ fn header(body: &mut String, document: &Document, provenance: &Provenance) {
     let names = ["atlas.json", "atlas.npz", "surface.glb"];
     let links = names.map(|name| format!("<a href=\"{}\">{name}</a>", link(name)));
     let _ = writeln!(body, "{}.</p>", links.join(", "));
-    let _ = writeln!(
-        body,
-        "<p class=\"soft\">Input <code>{}</code>, configuration <code>{}</code> (BLAKE3).</p>",
-        escape(&document.source.blake3),
-        escape(&document.source.config_blake3)
-    );
 }
 
 /// One view with its buttons.

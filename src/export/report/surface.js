@@ -483,7 +483,7 @@ class Surface {
         gl.vertexAttribDivisor(index, 1);
       }
       gl.uniform1f(line.uniforms.width, wide * view.ratio);
-      gl.uniform1f(line.uniforms.nearer, view.space === 0 ? 0.0012 + 0.0004 * i : 0);
+      gl.uniform1f(line.uniforms.nearer, view.space === 0 ? 0.004 + 0.0008 * i : 0);
       gl.uniform4fv(line.uniforms.ink, ink);
       gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, count);
     });
@@ -494,7 +494,7 @@ class Surface {
     gl.useProgram(cone.made);
     gl.uniformMatrix4fv(cone.uniforms.matrix, false, view.matrix);
     gl.uniform1f(cone.uniforms.side, 17 * view.ratio);
-    gl.uniform1f(cone.uniforms.nearer, view.space === 0 ? 0.012 : 0);
+    gl.uniform1f(cone.uniforms.nearer, view.space === 0 ? 0.035 : 0);
     gl.uniform3fv(cone.uniforms.inks, [...palette.positive, ...palette.negative]);
     gl.bindVertexArray(this.markArrays[view.space]);
     gl.drawArrays(gl.POINTS, 0, this.marks[view.space].length);
