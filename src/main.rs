@@ -19,8 +19,8 @@ use affine_atlas::outcome::{AssetOutcome, Failure, FailureKind};
 use affine_atlas::read::{self, ReadParams};
 use affine_atlas::verify::{self, SourceSurface, VerifyOptions};
 use cli::work::{
-    FitRequest, FitResult, Inspection, RebuildRequest, RebuildResult, SurveyRequest, Surveyed,
-    TextureRequest, TextureResult, VerifyRequest, VerifyResult, Work,
+    ExplainRequest, Explained, FitRequest, FitResult, Inspection, RebuildRequest, RebuildResult,
+    SurveyRequest, Surveyed, TextureRequest, TextureResult, VerifyRequest, VerifyResult, Work,
 };
 use std::path::Path;
 use std::process::ExitCode;
@@ -36,6 +36,7 @@ const WORK: Work = Work {
     rebuild,
     fit,
     texture,
+    explain,
     remove_staging: remove_all_staging,
 };
 
@@ -160,5 +161,15 @@ fn texture(request: &TextureRequest) -> Result<TextureResult, Failure> {
     Ok(TextureResult {
         text: textured.to_string(),
         json: textured.json(),
+    })
+}
+
+fn explain(request: &ExplainRequest) -> Result<Explained, Failure> {
+    let said = job::explain::asset(&request.asset, &request.config)?;
+    let glb = said.glb().transpose();
+    Ok(Explained {
+        glb: glb.map_err(|e| Failure::from(&BuildError::Export(e)))?,
+        failed: said.failed(),
+        text: said.to_string(),
     })
 }

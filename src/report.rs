@@ -90,9 +90,7 @@ impl Row {
 }
 
 /// Measures a face; nothing where it has no area in space or by its flat lengths.
-fn row(mesh: &Mesh, metric: &FlatMetric, f: FaceId, chart_area: f64) -> Option<Row> {
-    let p = mesh.face_positions(f);
-    let flat = mesh.connectivity.face_edges(f).map(|e| metric.length[e]);
+fn row(p: [[f64; 3]; 3], flat: [f64; 3], chart_area: f64) -> Option<Row> {
     let space = [
         distance3(p[1], p[2]),
         distance3(p[2], p[0]),
@@ -147,8 +145,16 @@ pub struct FaceDistortion {
 /// leaves out.
 pub fn face_distortions(mesh: &Mesh, metric: &FlatMetric) -> FaceVec<Option<FaceDistortion>> {
     let c = &mesh.connectivity;
+    let flat = |f| c.face_edges(f).map(|e| metric.length[e]);
+    distortions(c.faces().map(|f| (mesh.face_positions(f), flat(f)))).into()
+}
+
+/// The same of faces given by their corners in space and their flat lengths, each opposite its corner.
+pub fn distortions(
+    faces: impl Iterator<Item = ([[f64; 3]; 3], [f64; 3])>,
+) -> Vec<Option<FaceDistortion>> {
     // The chart's areas are not asked for.
-    let rows: Vec<Option<Row>> = c.faces().map(|f| row(mesh, metric, f, 0.0)).collect();
+    let rows: Vec<Option<Row>> = faces.map(|(p, flat)| row(p, flat, 0.0)).collect();
     let (source, flat) = totals(rows.iter().flatten());
     let of = |row: &Row| FaceDistortion {
         weight: row.source_area / source,
@@ -174,7 +180,10 @@ fn distortion_in(
     let c = &mesh.connectivity;
     let rows: Vec<Row> = c
         .faces()
-        .filter_map(|f| row(mesh, metric, f, chart_area(f)?))
+        .filter_map(|f| {
+            let flat = c.face_edges(f).map(|e| metric.length[e]);
+            row(mesh.face_positions(f), flat, chart_area(f)?)
+        })
         .collect();
     let chart_total: f64 = rows.iter().map(|r| r.chart_area).sum();
     let (source_total, flat_total) = totals(rows.iter());

@@ -84,6 +84,9 @@ pub enum Command {
     /// Lay a repeating image over the whole surface as one texture
     #[command(after_help = TEXTURE_EXAMPLES, after_long_help = TEXTURE_EXAMPLES)]
     Texture(Texture),
+    /// Say in plain words why an asset failed, or where it is distorted
+    #[command(after_help = EXPLAIN_EXAMPLES, after_long_help = EXPLAIN_EXAMPLES)]
+    Explain(Explain),
     /// Print a JSON schema of what is written, or of the configuration
     #[command(after_help = SCHEMA_EXAMPLES, after_long_help = SCHEMA_EXAMPLES)]
     Schema(Schema),
@@ -91,6 +94,15 @@ pub enum Command {
     #[command(after_help = INIT_EXAMPLES, after_long_help = INIT_EXAMPLES)]
     Init(Init),
 }
+
+const EXPLAIN_EXAMPLES: &str = "\
+Examples:
+  affine-atlas explain broken.obj                     runs the checks of a build and flattens it
+  affine-atlas explain broken.obj -o broken.glb       the faces at fault in colour
+  affine-atlas explain my.toml broken.obj             with the settings of my.toml
+  affine-atlas explain affine-atlas-out/bunny         where a finished atlas is distorted, and why
+
+Exit code 1 where the asset fails.";
 
 const SCHEMA_EXAMPLES: &str = "\
 Examples:
@@ -105,7 +117,7 @@ Examples:
   affine-atlas build bunny.obj --set cones.strategy=spread --set cones.count=6
   affine-atlas build my.toml bunny.obj            settings of my.toml, another mesh
 
-Each mesh becomes a folder OUT/NAME with atlas.json, atlas.npz, surface.glb, images/ and pictures.
+Each mesh becomes a folder OUT/NAME with atlas.json, atlas.npz, surface.glb, images/, report.html and pictures.
 It appears when it is complete; an older good folder stays if the build fails.";
 
 const CHECK_EXAMPLES: &str = "\
@@ -329,6 +341,16 @@ pub struct Init {
     /// Replace an existing file
     #[arg(long)]
     pub force: bool,
+}
+
+/// What to explain.
+#[derive(Debug, Args)]
+pub struct Explain {
+    #[command(flatten)]
+    pub inputs: Inputs,
+    /// Write the faces at fault, in colour on the surface around them
+    #[arg(short, long, value_name = "FILE.glb")]
+    pub out: Option<PathBuf>,
 }
 
 /// What to print.

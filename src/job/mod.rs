@@ -3,9 +3,10 @@
 //! `build_component` is the pipeline of the tutorial (5.1) on one page, its first half on another (`flatten`): data only
 //! flows forward, and a finished value is never changed. [`build`] does it for every component of a mesh in memory, [`run`] for a file,
 //! [`inspect`] stops before the flow, [`survey`] tries different cones, [`rebuild`] goes back from images to a mesh, [`fit`] on to
-//! spline surfaces, [`texture`] lays a pattern over the surface.
+//! spline surfaces, [`texture`] lays a pattern over the surface, [`explain`] says what is wrong.
 
 mod error;
+pub mod explain;
 pub mod fit;
 mod flatten;
 mod inspect;
