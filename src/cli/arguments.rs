@@ -117,8 +117,8 @@ Examples:
   affine-atlas build bunny.obj --set cones.strategy=spread --set cones.count=6
   affine-atlas build my.toml bunny.obj            settings of my.toml, another mesh
 
-Each mesh becomes a folder OUT/NAME with atlas.json, atlas.npz, surface.glb, images/, report.html and pictures.
-It appears when it is complete; an older good folder stays if the build fails.";
+Each mesh becomes a folder OUT/NAME with atlas.json, atlas.npz, surface.glb, images/, pictures and
+report.html. It appears when it is complete; an older good folder stays if the build fails.";
 
 const CHECK_EXAMPLES: &str = "\
 Examples:

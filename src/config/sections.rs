@@ -1,12 +1,13 @@
 //! The sections of [`Config`](super::Config).
 //!
-//! Most are the stages' own parameters; `[input]`, `[output]`, `[pictures]`, `[report]` and `[run]` belong here.
+//! Most are the stages' own parameters; `[input]`, `[output]`, `[pictures]` and `[run]` belong here.
 
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 pub use crate::atlas::geometry_image::ImageParams;
 pub use crate::atlas::patches::PatchParams;
+pub use crate::export::report::ReportParams;
 pub use crate::flow::cones::{BoundaryParams, ConeParams};
 pub use crate::flow::refine::RefineParams;
 pub use crate::flow::ricci::FlowParams;
@@ -53,26 +54,6 @@ impl Default for PictureParams {
         Self {
             enabled: true,
             size: 1024,
-        }
-    }
-}
-
-/// `[report]`: a page of each component to look at in a browser.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ReportParams {
-    /// Whether `report.html` is written.
-    pub enabled: bool,
-    /// Most faces of a surface that is drawn on the page.
-    pub max_faces: usize,
-}
-
-impl Default for ReportParams {
-    /// 32 bytes a face, so that a page has about 16 MB at the most.
-    fn default() -> Self {
-        Self {
-            enabled: true,
-            max_faces: 500_000,
         }
     }
 }

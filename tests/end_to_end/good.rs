@@ -59,7 +59,13 @@ fn one_and_two_threads(fixture: &str, genus: u32, loops: u32) {
         assert!(bytes == &second[file], "{file} depends on the threads");
         assert!(!bytes.is_empty(), "{file} is empty");
     }
-    for file in ["atlas.json", "atlas.npz", "surface.glb", "images/0000.exr"] {
+    for file in [
+        "atlas.json",
+        "atlas.npz",
+        "surface.glb",
+        "images/0000.exr",
+        "report.html",
+    ] {
         assert!(first.contains_key(file), "{file} is missing");
     }
     for picture in ["preview", "layout", "log-scale", "convergence"] {

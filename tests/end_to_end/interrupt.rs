@@ -1,6 +1,6 @@
 //! Ctrl-C in the middle of a build.
 
-use crate::command::{build_into, program};
+use crate::command::{OF_THE_RUN, build_into, program};
 use crate::good::files;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -105,7 +105,7 @@ fn interrupt_at(stage: &str) {
                 .to_string_lossy()
                 .into_owned()
         })
-        .filter(|name| name != "mesh" && name != "manifest.jsonl")
+        .filter(|name| name != "mesh" && !OF_THE_RUN.contains(&name.as_str()))
         .collect();
     assert!(left.is_empty(), "{left:?} stayed behind");
 }

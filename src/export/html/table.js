@@ -1,6 +1,8 @@
 // Tables that are sorted by a click on a column's head.
 "use strict";
 
+const collator = new Intl.Collator();
+
 for (const table of document.querySelectorAll("table[data-sortable]")) {
   const body = table.tBodies[0];
   const heads = [...table.tHead.rows[0].cells];
@@ -23,7 +25,7 @@ for (const table of document.querySelectorAll("table[data-sortable]")) {
       const compare = (a, b) => {
         if (a.text === "" || b.text === "") return (a.text === "") - (b.text === "");
         const known = Number.isNaN(a.number) - Number.isNaN(b.number);
-        const order = known || (Number.isNaN(a.number) ? a.text.localeCompare(b.text) : a.number - b.number);
+        const order = known || (Number.isNaN(a.number) ? collator.compare(a.text, b.text) : a.number - b.number);
         return down ? -order : order;
       };
       rows.sort(compare);

@@ -26,6 +26,7 @@ for (const button of buttons) {
     state = button.dataset.state;
     for (const other of buttons) other.setAttribute("aria-pressed", String(other === button));
     filter();
+    document.getElementById("all").scrollIntoView();
   });
 }
 search.addEventListener("input", filter);

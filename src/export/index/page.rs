@@ -54,9 +54,9 @@ fn counts(body: &mut String, assets: &[Asset<'_>]) {
     let seconds: f64 = assets.iter().map(|a| a.record.seconds).sum();
     let _ = writeln!(
         body,
-        "<p>{} assets, {} s of work together.</p>\n<div class=\"counts\" role=\"group\" aria-label=\"Show assets by state\">",
+        "<p>{} assets, {} of work together.</p>\n<div class=\"counts\" role=\"group\" aria-label=\"Show assets by state\">",
         assets.len(),
-        figure(seconds)
+        duration(seconds)
     );
     let _ = writeln!(
         body,
@@ -73,6 +73,16 @@ fn counts(body: &mut String, assets: &[Asset<'_>]) {
         );
     }
     body.push_str("</div>\n");
+}
+
+/// Seconds as people say them.
+pub(super) fn duration(seconds: f64) -> String {
+    let whole = seconds.max(0.0).min(1e12).round() as u64;
+    match (whole / 3600, whole / 60 % 60) {
+        (0, 0) => format!("{seconds:.1} s"),
+        (0, minutes) => format!("{minutes} min {} s", whole % 60),
+        (hours, minutes) => format!("{hours} h {minutes} min"),
+    }
 }
 
 /// The id with a link to its folder, and to its reports.
@@ -105,7 +115,7 @@ fn sentence(asset: &Asset<'_>) -> String {
     let error = record.error.as_deref().unwrap_or("no reason was recorded");
     let kept = match record.files.is_empty() {
         true => "",
-        false => " The result of an earlier run is still in place.",
+        false => " <span class=\"soft\">– the result of an earlier run is still in place</span>",
     };
     format!("<b>{kind}</b>: {}{kept}", escape(error))
 }

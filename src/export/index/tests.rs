@@ -110,6 +110,19 @@ fn changes_are_told_from_the_run_before() {
 }
 
 #[test]
+fn durations_are_read_at_a_glance() {
+    for (seconds, words) in [
+        (0.04, "0.0 s"),
+        (59.4, "59.4 s"),
+        (61.0, "1 min 1 s"),
+        (7_260.0, "2 h 1 min"),
+        (f64::NAN, "NaN s"),
+    ] {
+        assert_eq!(page::duration(seconds), words);
+    }
+}
+
+#[test]
 fn cached_assets_are_not_read_again() {
     let root = tempfile::tempdir().unwrap();
     night(root.path(), &[("spot", State::Built, 0.125)]);

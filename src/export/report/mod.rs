@@ -13,7 +13,6 @@ mod plots;
 mod surface;
 mod tables;
 
-use crate::config::ReportParams;
 use crate::export::atlas_json::{self, Document};
 use crate::export::folder::Staging;
 use crate::export::html::{self, escape, figure, link};
@@ -22,6 +21,7 @@ use crate::flow::ricci::Solver;
 use crate::product::AffineAtlas;
 use crate::report::face_distortions;
 use plots::Histogram;
+use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::io;
 use surface::{Drawing, RISING, Scales};
@@ -32,6 +32,26 @@ pub const FILE_NAME: &str = "report.html";
 const STYLE: &str = include_str!("report.css");
 const SURFACE: &str = include_str!("surface.js");
 const SCRIPT: &str = include_str!("report.js");
+
+/// What is written of a component for a browser (`[report]`).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ReportParams {
+    /// Whether `report.html` is written.
+    pub enabled: bool,
+    /// Most faces of a surface that is drawn on the page.
+    pub max_faces: usize,
+}
+
+impl Default for ReportParams {
+    /// 32 bytes a face, so that a page has about 16 MB at the most.
+    fn default() -> Self {
+        Self {
+            enabled: true,
+            max_faces: 500_000,
+        }
+    }
+}
 
 /// Writes the report of an atlas into a staging folder; `subfolder` as for
 /// [`write_component`](crate::export::write_component).
