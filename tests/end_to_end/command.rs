@@ -15,9 +15,6 @@ pub fn program() -> Command {
     command
 }
 
-/// Files of the run as a whole, beside the folders of assets.
-pub const OF_THE_RUN: [&str; 3] = ["manifest.jsonl", "index.html", "history.jsonl"];
-
 /// A finished build in a temporary folder.
 pub struct Built {
     /// Folder of all assets.

@@ -1,6 +1,7 @@
 //! Ctrl-C in the middle of a build.
 
-use crate::command::{OF_THE_RUN, build_into, program};
+use crate::OF_THE_RUN;
+use crate::command::{build_into, program};
 use crate::good::files;
 use std::collections::BTreeMap;
 use std::fmt::Write;

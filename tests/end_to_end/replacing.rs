@@ -1,6 +1,7 @@
 //! Older output: replaced as a whole by better, kept where the new build fails.
 
-use crate::command::{OF_THE_RUN, build_into, document, verify};
+use crate::OF_THE_RUN;
+use crate::command::{build_into, document, verify};
 use crate::good::files;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};

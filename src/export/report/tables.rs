@@ -133,7 +133,7 @@ pub(super) fn figures(document: &Value) -> String {
         );
     }
     format!(
-        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Figures\"><table class=\"figures\" id=\"figures\"><tbody>\n{rows}</tbody></table></div>\n"
+        "<div class=\"scroll whole\" tabindex=\"0\" role=\"region\" aria-label=\"Figures\"><table class=\"figures\" id=\"figures\"><tbody>\n{rows}</tbody></table></div>\n"
     )
 }
 
