@@ -19,7 +19,7 @@ pub fn config() -> Value {
     }
     for (section, words) in words.sections {
         if let Some(entry) = root["properties"].get_mut(section) {
-            entry["description"] = words.into();
+            entry["description"] = words;
         }
     }
     root["$schema"] = DRAFT.into();

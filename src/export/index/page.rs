@@ -77,7 +77,7 @@ fn counts(body: &mut String, assets: &[Asset<'_>]) {
 
 /// Seconds as people say them.
 pub(super) fn duration(seconds: f64) -> String {
-    let whole = seconds.max(0.0).min(1e12).round() as u64;
+    let whole = seconds.clamp(0.0, 1e12).round() as u64;
     match (whole / 3600, whole / 60 % 60) {
         (0, 0) => format!("{seconds:.1} s"),
         (0, minutes) => format!("{minutes} min {} s", whole % 60),
@@ -127,7 +127,8 @@ fn compared(body: &mut String, assets: &[Asset<'_>], changes: &Changes) {
         return;
     }
     let mut any = false;
-    let groups: [(&str, fn(Change) -> bool); 4] = [
+    type Belongs = fn(Change) -> bool;
+    let groups: [(&str, Belongs); 4] = [
         ("New failures", |c| c == Change::NewFailure),
         ("Fixed", |c| c == Change::Fixed),
         ("Worse distortion", |c| matches!(c, Change::Worse(..))),
@@ -152,9 +153,9 @@ fn compared(body: &mut String, assets: &[Asset<'_>], changes: &Changes) {
             Change::New => "",
             _ => " open",
         };
-        let _ = write!(
+        let _ = writeln!(
             body,
-            "<details class=\"change\"{open}><summary><b>{}</b> {title}{note}</summary><ul>\n",
+            "<details class=\"change\"{open}><summary><b>{}</b> {title}{note}</summary><ul>",
             rows.len()
         );
         for (asset, change) in rows {
@@ -169,9 +170,9 @@ fn compared(body: &mut String, assets: &[Asset<'_>], changes: &Changes) {
     }
     if !changes.removed.is_empty() {
         any = true;
-        let _ = write!(
+        let _ = writeln!(
             body,
-            "<details class=\"change\"><summary><b>{}</b> Removed</summary><ul>\n",
+            "<details class=\"change\"><summary><b>{}</b> Removed</summary><ul>",
             changes.removed.len()
         );
         for id in &changes.removed {

@@ -195,9 +195,9 @@ fn header(body: &mut String, document: &Document, provenance: &Provenance) {
     }
     let cones = document.cones.len();
     let patches = document.patches.len();
-    let _ = write!(
+    let _ = writeln!(
         body,
-        "Made from <code>{}</code> by {} {}: {} faces, {cones} {}, {patches} {}.</p>\n",
+        "Made from <code>{}</code> by {} {}: {} faces, {cones} {}, {patches} {}.</p>",
         escape(&document.source.path),
         escape(&document.generator.name),
         escape(&document.generator.version),
@@ -300,9 +300,9 @@ fn legends(body: &mut String, scales: &Scales) {
     body.push_str("<div class=\"legends\">\n<div class=\"legend\" data-legend=\"board\"><span class=\"words\">Squares are squares of the flat metric; where they would be too small or too large to see, sizes change by powers of two.</span></div>\n");
     let mut bar = |layer: &str, words: &str, colours: &[String], ends: [f64; 3]| {
         let [low, mid, high] = ends.map(figure);
-        let _ = write!(
+        let _ = writeln!(
             body,
-            "<div class=\"legend\" data-legend=\"{layer}\" hidden><span class=\"words\">{words}</span><div class=\"bar\" style=\"background:linear-gradient(to right,{})\"></div><span>{low}</span><span>{mid}</span><span>{high}</span></div>\n",
+            "<div class=\"legend\" data-legend=\"{layer}\" hidden><span class=\"words\">{words}</span><div class=\"bar\" style=\"background:linear-gradient(to right,{})\"></div><span>{low}</span><span>{mid}</span><span>{high}</span></div>",
             colours.join(",")
         );
     };

@@ -284,9 +284,9 @@ pub(super) fn repair(document: &Document, log: &RepairLog) -> String {
     if log.is_empty() {
         return out;
     }
-    let _ = write!(
+    let _ = writeln!(
         out,
-        "<details><summary>Change by change ({}), by vertices and faces of the file</summary><ol>\n",
+        "<details><summary>Change by change ({}), by vertices and faces of the file</summary><ol>",
         log.changes.len()
     );
     for change in log.changes.iter().take(LISTED) {

@@ -104,18 +104,21 @@ impl Flat {
                 "hardly distorted: the standard deviation of the log scale is {std:.3}, below {EVEN}; nothing to change"
             ));
         } else {
-            let mut far = 0;
+            let (mut far, mut peaks) = (0, Vec::new());
             for (mark, sign) in [(Mark::Grown, 1.0), (Mark::Shrunk, -1.0)] {
                 for region in self.regions(sign).iter().take(TOLD) {
                     for &f in &region.faces {
                         marks[f] = mark;
                     }
-                    let (line, is_far) = self.tell(region, mark);
-                    far += usize::from(is_far);
+                    let (line, cone) = self.tell(region, mark);
+                    match cone {
+                        Some(cone) => peaks.push((mark, cone.curvature)),
+                        None => far += 1,
+                    }
                     lines.push(line);
                 }
             }
-            lines.extend(self.advice(far));
+            lines.extend(self.advice(far, &peaks));
         }
         lines.extend(self.angles(&mut marks));
         let surface = Marked {
@@ -224,8 +227,8 @@ impl Flat {
         near.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// One sentence about a region, and whether it is far from all cones.
-    fn tell(&self, region: &Region, mark: Mark) -> (String, bool) {
+    /// One sentence about a region, and the cone that it surrounds.
+    fn tell(&self, region: &Region, mark: Mark) -> (String, Option<&Cone>) {
         let at = self.centre(region.peak);
         let extent = region.faces.iter().map(|&f| distance(self.centre(f), at));
         let extent = extent.fold(0.0, f64::max);
@@ -241,7 +244,7 @@ impl Flat {
             factor(log),
         );
         let Some((cone, away)) = self.nearest(at) else {
-            return (line + "; there is no cone", true);
+            return (line + "; there is no cone", None);
         };
         let near = away <= NEAR * extent.max(0.01 * self.diagonal());
         let place = match cone.source_vertex {
@@ -256,42 +259,45 @@ impl Flat {
                 percent(away / self.diagonal())
             ),
         };
-        (line, !near)
+        (line, near.then_some(cone))
     }
 
-    /// What to change, by where the regions are.
-    fn advice(&self, far: usize) -> Vec<String> {
+    /// What to change, by where the regions are. `peaks` are the curvatures of the cones that some surround.
+    ///
+    /// Measured on spot, camelhead, bunny and nefertiti: twice as many cones lower the deviation by 0.37 to 0.47 of itself; limits on
+    /// curvature lower the peaks (on spot from a factor of 6.0 to 2.0), but with as many cones raise the deviation.
+    fn advice(&self, far: usize, peaks: &[(Mark, f64)]) -> Vec<String> {
         let count = self.cones.len();
+        let more = (2 * count).max(4);
         let mut lines = Vec::new();
         if far > 0 {
-            let more = (2 * count).max(4);
             lines.push(format!(
                 "to change: {far} of these regions have no cone near, so features there have nowhere to gather their curvature: raise cones.count from {count} to {more} (`affine-atlas cones MESH --counts {more}` shows what that gains)"
             ));
         }
-        let strong = self
-            .cones
-            .iter()
-            .max_by(|a, b| a.curvature.total_cmp(&b.curvature));
-        if let Some(cone) = strong.filter(|cone| cone.curvature > 0.75 * PI) {
+        let at = |mark: Mark| {
+            peaks
+                .iter()
+                .filter(move |peak| peak.0 == mark)
+                .map(|peak| peak.1)
+        };
+        let strongest = at(Mark::Grown).fold(0.0, f64::max);
+        if strongest > 0.75 * PI {
             lines.push(format!(
-                "to change: the strongest cone has {}; cones.max_curvature = \"1/2\" spreads it over several of at most 0.5π, around which the scale grows more slowly",
-                short(cone.curvature)
+                "to change: where lengths grow most is a cone of {}: cones.max_curvature = \"1/2\" lowers that peak, but with {count} cones the rest gets less even, so set cones.count = {more} with it",
+                short(strongest)
             ));
         }
-        let negative = self
-            .cones
-            .iter()
-            .min_by(|a, b| a.curvature.total_cmp(&b.curvature));
-        if let Some(cone) = negative.filter(|cone| cone.curvature < -PI) {
+        let strongest = at(Mark::Shrunk).fold(0.0, f64::min);
+        if strongest < -PI {
             lines.push(format!(
-                "to change: the strongest negative cone has {}; cones.min_curvature = -1 divides it among several of at least -1π",
-                short(cone.curvature)
+                "to change: where lengths shrink most is a cone of {}: cones.min_curvature = -1 makes that less, but with {count} cones the rest gets less even, so set cones.count = {more} with it",
+                short(strongest)
             ));
         }
         if lines.is_empty() {
             lines.push(format!(
-                "to change: more cones ({count} now; cones.count), or cones.objective = \"area-distortion\" where growing matters more than shrinking"
+                "to change: raise cones.count from {count} to {more}; or cones.objective = \"area-distortion\" where growing matters more than shrinking"
             ));
         }
         lines
@@ -331,7 +337,7 @@ impl Flat {
         )];
         if share > EXTREME {
             lines.push(format!(
-                "to change: faces there are large for how much the surface bends: divide them until less than {} of the area is above {SHEARED} rad (now {}); with flow.scheme other than \"vertex-scaling\" try that",
+                "to change: faces there are large for how much the surface bends: divide them until less than {} of the area is above {SHEARED} rad (now {}); where flow.scheme is not \"vertex-scaling\", that one keeps angles better",
                 percent(EXTREME),
                 percent(share)
             ));
