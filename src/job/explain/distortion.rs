@@ -227,7 +227,7 @@ impl Flat {
         near.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// One sentence about a region, and the cone that it surrounds.
+    /// One sentence about a region, and the cone that it lies at.
     fn tell(&self, region: &Region, mark: Mark) -> (String, Option<&Cone>) {
         let at = self.centre(region.peak);
         let extent = region.faces.iter().map(|&f| distance(self.centre(f), at));
@@ -253,7 +253,7 @@ impl Flat {
         };
         let curvature = short(cone.curvature);
         line += &match near {
-            true => format!("; it surrounds the cone of {curvature} at {place}"),
+            true => format!("; it lies at the cone of {curvature} at {place}"),
             false => format!(
                 "; the nearest cone, {curvature} at {place}, is {} of the diagonal away",
                 percent(away / self.diagonal())
@@ -262,7 +262,7 @@ impl Flat {
         (line, near.then_some(cone))
     }
 
-    /// What to change, by where the regions are. `peaks` are the curvatures of the cones that some surround.
+    /// What to change, by where the regions are. `peaks` are the curvatures of the cones that some lie at.
     ///
     /// Measured on spot, camelhead, bunny and nefertiti: twice as many cones lower the deviation by 0.37 to 0.47 of itself; limits on
     /// curvature lower the peaks (on spot from a factor of 6.0 to 2.0), but with as many cones raise the deviation.
@@ -356,9 +356,10 @@ fn factor(log: f64) -> String {
 }
 
 fn percent(share: f64) -> String {
-    match share < 1e-3 {
-        true => format!("{:.1e} %", 100.0 * share),
-        false => format!("{:.1} %", 100.0 * share),
+    match share {
+        0.0 => "0 %".to_owned(),
+        _ if share < 1e-3 => format!("{:.1e} %", 100.0 * share),
+        _ => format!("{:.1} %", 100.0 * share),
     }
 }
 
