@@ -1,6 +1,6 @@
 //! `index.html`: what a run over many assets came to, for the person who looks at it in the morning.
 //!
-//! *Enters:* the manifest of an output root, the `atlas.json` of its assets, and [`history`] of the run before. *Leaves:* one page
+//! *Enters:* the manifest of an output root, the `atlas.json` of its assets, and the history of the run before. *Leaves:* one page
 //! that needs no network, with links to folders and reports, and the history for the next run.
 //!
 //! *Guaranteed:* nothing but the manifest's figures and those of `atlas.json`; both files are replaced in one step each; names and messages
