@@ -77,6 +77,7 @@ pub mod read;
 pub mod rebuild;
 pub mod repair;
 pub mod report;
+pub mod schema;
 pub mod texture;
 pub mod verify;
 

@@ -8,6 +8,7 @@ mod cli;
 use affine_atlas::config::Config;
 use affine_atlas::config::assets::Asset;
 use affine_atlas::export::folder::remove_all_staging;
+use affine_atlas::export::index;
 use affine_atlas::export::manifest::{Manifest, Record};
 use affine_atlas::job::fit::FitParams;
 use affine_atlas::job::rebuild::RebuildAssetError;
@@ -18,8 +19,8 @@ use affine_atlas::outcome::{AssetOutcome, Failure, FailureKind};
 use affine_atlas::read::{self, ReadParams};
 use affine_atlas::verify::{self, SourceSurface, VerifyOptions};
 use cli::work::{
-    FitRequest, FitResult, Inspection, RebuildRequest, RebuildResult, SurveyRequest, Surveyed,
-    TextureRequest, TextureResult, VerifyRequest, VerifyResult, Work,
+    ExplainRequest, Explained, FitRequest, FitResult, Inspection, RebuildRequest, RebuildResult,
+    SurveyRequest, Surveyed, TextureRequest, TextureResult, VerifyRequest, VerifyResult, Work,
 };
 use std::path::Path;
 use std::process::ExitCode;
@@ -35,6 +36,7 @@ const WORK: Work = Work {
     rebuild,
     fit,
     texture,
+    explain,
     remove_staging: remove_all_staging,
 };
 
@@ -54,7 +56,8 @@ fn record(output: &Path, config: &Config, outcomes: &[AssetOutcome]) -> Result<(
     for outcome in outcomes {
         manifest.insert(Record::of(outcome, &config_hash));
     }
-    manifest.save(output).map_err(failure)
+    manifest.save(output).map_err(failure)?;
+    index::write(output, &manifest).map_err(failure)
 }
 
 fn inspect(asset: &Asset, config: &Config) -> Result<Inspection, Failure> {
@@ -158,5 +161,15 @@ fn texture(request: &TextureRequest) -> Result<TextureResult, Failure> {
     Ok(TextureResult {
         text: textured.to_string(),
         json: textured.json(),
+    })
+}
+
+fn explain(request: &ExplainRequest) -> Result<Explained, Failure> {
+    let said = job::explain::asset(&request.asset, &request.config)?;
+    let glb = said.glb().transpose();
+    Ok(Explained {
+        glb: glb.map_err(|e| Failure::from(&BuildError::Export(e)))?,
+        failed: said.failed(),
+        text: said.to_string(),
     })
 }

@@ -8,7 +8,9 @@ use crate::atlas::patches::PatchLayout;
 use crate::flow::cones::Prescription;
 use crate::flow::ricci::{FlatMetric, FlowParams};
 use crate::geometry::connectivity::Topology;
+use crate::geometry::ids::VertexVec;
 use crate::geometry::mesh::Mesh;
+use crate::repair::RepairLog;
 use serde::{Deserialize, Serialize};
 
 /// A built component.
@@ -40,10 +42,15 @@ pub struct AffineAtlas {
     pub image_origin: [f64; 3],
     /// What repair changed: counts by name, as `atlas.json` lists them.
     pub repair: std::collections::BTreeMap<String, u64>,
+    /// The same change by change.
+    pub repair_log: RepairLog,
     /// What connectivity repair changed.
     pub connectivity_repair: ConnectivityRepair,
     /// Measured from the data above, not taken from any stage.
     pub quality: Quality,
+    /// Distance of every vertex from the mesh rebuilt from the images, source units; absent where nobody asked for it or the images
+    /// do not make a mesh.
+    pub image_distance: Option<VertexVec<f64>>,
     /// True where every gluing is a quarter turn to 1e-8.
     pub seamless: bool,
 }
@@ -57,7 +64,7 @@ impl AffineAtlas {
 }
 
 /// What connectivity repair changed (tutorial 5.3).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ConnectivityRepair {
     /// Edge and face splits.
     pub splits: usize,
@@ -68,7 +75,7 @@ pub struct ConnectivityRepair {
 }
 
 /// Minimum, maximum and standard deviation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Spread {
     /// Least value.
     pub min: f64,
@@ -79,7 +86,7 @@ pub struct Spread {
 }
 
 /// Mean and maximum.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct MeanMax {
     /// Mean, weighted by source area.
     pub mean: f64,
@@ -88,7 +95,7 @@ pub struct MeanMax {
 }
 
 /// How well the atlas turned out.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Quality {
     /// (9), both areas normalised to 1.
     pub area_distortion: f64,

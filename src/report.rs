@@ -13,7 +13,7 @@ use crate::atlas::develop::{Development, diameter};
 use crate::atlas::plane::{RigidMotion, distance, doubled_area, wrap_angle};
 use crate::flow::cones::Prescription;
 use crate::flow::ricci::FlatMetric;
-use crate::geometry::ids::{FaceId, HalfedgeId, NONE};
+use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId, NONE};
 use crate::geometry::mesh::{Mesh, distance as distance3, triangle_area};
 use crate::geometry::triangle::{angles, area};
 use crate::product::{MeanMax, Quality, Spread};
@@ -77,6 +77,41 @@ struct Row {
     flat_angles: [f64; 3],
 }
 
+impl Row {
+    /// ½ ln of the ratio of areas, with logarithms apart: flat areas span more than a quotient can hold.
+    fn log_scale(&self, source_total: f64, flat_total: f64) -> f64 {
+        let log = |part: f64, total: f64| part.ln() - total.ln();
+        0.5 * (log(self.flat_area, flat_total) - log(self.source_area, source_total))
+    }
+
+    fn angle_errors(&self) -> [f64; 3] {
+        std::array::from_fn(|k| (self.source_angles[k] - self.flat_angles[k]).abs())
+    }
+}
+
+/// Measures a face; nothing where it has no area in space or by its flat lengths.
+fn row(p: [[f64; 3]; 3], flat: [f64; 3], chart_area: f64) -> Option<Row> {
+    let space = [
+        distance3(p[1], p[2]),
+        distance3(p[2], p[0]),
+        distance3(p[0], p[1]),
+    ];
+    Some(Row {
+        source_area: triangle_area(p),
+        chart_area,
+        flat_area: area(flat)?,
+        source_angles: angles(space)?,
+        flat_angles: angles(flat)?,
+    })
+}
+
+/// Areas of all faces in space and by their flat lengths.
+fn totals<'a>(rows: impl Iterator<Item = &'a Row>) -> (f64, f64) {
+    rows.fold((0.0, 0.0), |(source, flat), row| {
+        (source + row.source_area, flat + row.flat_area)
+    })
+}
+
 /// How far a flat metric is from the one in space.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Distortion {
@@ -95,6 +130,40 @@ pub fn distortion(mesh: &Mesh, metric: &FlatMetric) -> Distortion {
     distortion_in(mesh, metric, flat)
 }
 
+/// What flattening does to one face.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FaceDistortion {
+    /// Area in space over the whole surface's.
+    pub weight: f64,
+    /// ½ ln(flat area / source area), both totals 1.
+    pub log_scale: f64,
+    /// Difference of each corner's angle, radians.
+    pub angle_error: [f64; 3],
+}
+
+/// The distortion of every face by its flat lengths; nothing for those without an area in space or in the plane, which [`measure`]
+/// leaves out.
+pub fn face_distortions(mesh: &Mesh, metric: &FlatMetric) -> FaceVec<Option<FaceDistortion>> {
+    let c = &mesh.connectivity;
+    let flat = |f| c.face_edges(f).map(|e| metric.length[e]);
+    distortions(c.faces().map(|f| (mesh.face_positions(f), flat(f)))).into()
+}
+
+/// The same of faces given by their corners in space and their flat lengths, each opposite its corner.
+pub fn distortions(
+    faces: impl Iterator<Item = ([[f64; 3]; 3], [f64; 3])>,
+) -> Vec<Option<FaceDistortion>> {
+    // The chart's areas are not asked for.
+    let rows: Vec<Option<Row>> = faces.map(|(p, flat)| row(p, flat, 0.0)).collect();
+    let (source, flat) = totals(rows.iter().flatten());
+    let of = |row: &Row| FaceDistortion {
+        weight: row.source_area / source,
+        log_scale: row.log_scale(source, flat),
+        angle_error: row.angle_errors(),
+    };
+    rows.iter().map(|row| row.as_ref().map(of)).collect()
+}
+
 /// Length of the cut in space, source units.
 pub fn cut_length(mesh: &Mesh, cut: &CutGraph) -> f64 {
     let edges = cut.is_cut.enumerate().filter(|&(_, &is_cut)| is_cut);
@@ -109,26 +178,15 @@ fn distortion_in(
     chart_area: impl Fn(FaceId) -> Option<f64>,
 ) -> Distortion {
     let c = &mesh.connectivity;
-    let measure = |f| {
-        let p = mesh.face_positions(f);
-        let flat = c.face_edges(f).map(|e| metric.length[e]);
-        let space = [
-            distance3(p[1], p[2]),
-            distance3(p[2], p[0]),
-            distance3(p[0], p[1]),
-        ];
-        Some(Row {
-            source_area: triangle_area(p),
-            chart_area: chart_area(f)?,
-            flat_area: area(flat)?,
-            source_angles: angles(space)?,
-            flat_angles: angles(flat)?,
+    let rows: Vec<Row> = c
+        .faces()
+        .filter_map(|f| {
+            let flat = c.face_edges(f).map(|e| metric.length[e]);
+            row(mesh.face_positions(f), flat, chart_area(f)?)
         })
-    };
-    let rows: Vec<Row> = c.faces().filter_map(measure).collect();
-    let source_total: f64 = rows.iter().map(|r| r.source_area).sum();
+        .collect();
     let chart_total: f64 = rows.iter().map(|r| r.chart_area).sum();
-    let flat_total: f64 = rows.iter().map(|r| r.flat_area).sum();
+    let (source_total, flat_total) = totals(rows.iter());
     let mut area_distortion = 0.0;
     let mut scale = Spread {
         min: f64::INFINITY,
@@ -140,15 +198,12 @@ fn distortion_in(
     for row in rows {
         let weight = row.source_area / source_total;
         area_distortion += (row.chart_area / chart_total / weight - 1.0).powi(2) * weight;
-        // ½ ln of the ratio, with logarithms apart: flat areas span more than a quotient can hold.
-        let log = |part: f64, total: f64| part.ln() - total.ln();
-        let log = 0.5 * (log(row.flat_area, flat_total) - log(row.source_area, source_total));
+        let log = row.log_scale(source_total, flat_total);
         scale.min = scale.min.min(log);
         scale.max = scale.max.max(log);
         mean += weight * log;
         mean_square += weight * log * log;
-        for k in 0..3 {
-            let error = (row.source_angles[k] - row.flat_angles[k]).abs();
+        for error in row.angle_errors() {
             angle.mean += weight * error / 3.0;
             angle.max = angle.max.max(error);
         }

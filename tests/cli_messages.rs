@@ -465,6 +465,43 @@ fn wrong_arguments_exit_with_2_and_help_with_0() {
 }
 
 #[test]
+fn schema_and_explain_refuse_what_they_do_not_know() {
+    let folder = folder();
+    insta::assert_snapshot!(refusal(folder.path(), &["schema", "glb"], 2), @r"
+    error: invalid value 'glb' for '<FILE>'
+      [possible values: atlas, manifest, config]
+
+    For more information, try '--help'.
+    ");
+    insta::assert_snapshot!(refusal(folder.path(), &["explain", "nowhere/bunny"], 1), @"failed: nowhere/bunny (input): nowhere/bunny is neither a mesh nor a folder, and no manifest.jsonl beside it names it; give a mesh, or OUT/NAME of a build");
+    insta::assert_snapshot!(refusal(folder.path(), &["explain", ".", "-o", "a.obj"], 2), @r"
+    error: a.obj does not end in .glb, the only format that meshes are written in
+    help: name the file with `--out MESH.glb`
+    ");
+    std::fs::create_dir(folder.path().join("empty")).expect("created");
+    insta::assert_snapshot!(refusal(folder.path(), &["explain", "empty", "-o", "a.glb"], 1), @"failed: empty (input): empty holds no atlas.json and no component-000; give the folder that `affine-atlas build` wrote for a mesh");
+    assert!(!folder.path().join("a.glb").exists());
+}
+
+#[test]
+fn explain_names_and_shows_the_faces_at_fault() {
+    let folder = folder();
+    let strip = include_str!("../fixtures/bad/moebius-strip.obj");
+    std::fs::write(folder.path().join("strip.obj"), strip).expect("written");
+    let output = run(folder.path(), &["explain", "strip.obj", "-o", "why.glb"]);
+    assert_eq!(output.status.code(), Some(1));
+    let said = stdout(&output);
+    assert!(
+        said.starts_with("fails (input): the component of "),
+        "{said}"
+    );
+    assert!(said.contains("at 2 faces of the file: "), "{said}");
+    assert!(said.ends_with("faces: written to why.glb\n"), "{said}");
+    let bytes = std::fs::read(folder.path().join("why.glb")).expect("written");
+    assert!(bytes.starts_with(b"glTF"));
+}
+
+#[test]
 fn help() {
     let folder = folder();
     insta::assert_snapshot!(stdout(&run(folder.path(), &["-h"])), @r"
@@ -480,6 +517,8 @@ fn help() {
       rebuild  Make a mesh again from the geometry images of an atlas
       fit      Fit spline surfaces to the images of rectangles
       texture  Lay a repeating image over the whole surface as one texture
+      explain  Say in plain words why an asset failed, or where it is distorted
+      schema   Print a JSON schema of what is written, or of the configuration
       init     Write a configuration file that explains every key
       help     Print this message or the help of the given subcommand(s)
 
@@ -529,8 +568,8 @@ fn help() {
       affine-atlas build bunny.obj --set cones.strategy=spread --set cones.count=6
       affine-atlas build my.toml bunny.obj            settings of my.toml, another mesh
 
-    Each mesh becomes a folder OUT/NAME with atlas.json, atlas.npz, surface.glb, images/ and pictures.
-    It appears when it is complete; an older good folder stays if the build fails.
+    Each mesh becomes a folder OUT/NAME with atlas.json, atlas.npz, surface.glb, images/, pictures and
+    report.html. It appears when it is complete; an older good folder stays if the build fails.
     ");
     insta::assert_snapshot!(stdout(&run(folder.path(), &["cones", "-h"])), @r"
     Show what more or fewer cones gain, and write lists of them

@@ -84,10 +84,31 @@ pub enum Command {
     /// Lay a repeating image over the whole surface as one texture
     #[command(after_help = TEXTURE_EXAMPLES, after_long_help = TEXTURE_EXAMPLES)]
     Texture(Texture),
+    /// Say in plain words why an asset failed, or where it is distorted
+    #[command(after_help = EXPLAIN_EXAMPLES, after_long_help = EXPLAIN_EXAMPLES)]
+    Explain(Explain),
+    /// Print a JSON schema of what is written, or of the configuration
+    #[command(after_help = SCHEMA_EXAMPLES, after_long_help = SCHEMA_EXAMPLES)]
+    Schema(Schema),
     /// Write a configuration file that explains every key
     #[command(after_help = INIT_EXAMPLES, after_long_help = INIT_EXAMPLES)]
     Init(Init),
 }
+
+const EXPLAIN_EXAMPLES: &str = "\
+Examples:
+  affine-atlas explain broken.obj                     runs the checks of a build and flattens it
+  affine-atlas explain broken.obj -o broken.glb       the faces at fault in colour
+  affine-atlas explain my.toml broken.obj             with the settings of my.toml
+  affine-atlas explain affine-atlas-out/bunny         where a finished atlas is distorted, and why
+
+Exit code 1 where the asset fails.";
+
+const SCHEMA_EXAMPLES: &str = "\
+Examples:
+  affine-atlas schema config > config.schema.json     for editors that complete TOML
+  affine-atlas schema atlas                           of atlas.json
+  affine-atlas schema manifest                        of each line of manifest.jsonl";
 
 const BUILD_EXAMPLES: &str = "\
 Examples:
@@ -96,8 +117,8 @@ Examples:
   affine-atlas build bunny.obj --set cones.strategy=spread --set cones.count=6
   affine-atlas build my.toml bunny.obj            settings of my.toml, another mesh
 
-Each mesh becomes a folder OUT/NAME with atlas.json, atlas.npz, surface.glb, images/ and pictures.
-It appears when it is complete; an older good folder stays if the build fails.";
+Each mesh becomes a folder OUT/NAME with atlas.json, atlas.npz, surface.glb, images/, pictures and
+report.html. It appears when it is complete; an older good folder stays if the build fails.";
 
 const CHECK_EXAMPLES: &str = "\
 Examples:
@@ -320,6 +341,35 @@ pub struct Init {
     /// Replace an existing file
     #[arg(long)]
     pub force: bool,
+}
+
+/// What to explain.
+#[derive(Debug, Args)]
+pub struct Explain {
+    #[command(flatten)]
+    pub inputs: Inputs,
+    /// Write the faces at fault, in colour on the surface around them
+    #[arg(short, long, value_name = "FILE.glb")]
+    pub out: Option<PathBuf>,
+}
+
+/// What to print.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct Schema {
+    /// Which file
+    #[arg(value_name = "FILE", value_enum)]
+    pub of: SchemaOf,
+}
+
+/// What there are schemas of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SchemaOf {
+    /// atlas.json
+    Atlas,
+    /// a line of manifest.jsonl
+    Manifest,
+    /// config.toml
+    Config,
 }
 
 #[cfg(test)]

@@ -160,6 +160,12 @@ mod tests {
                 message: String::new(),
             })
         },
+        explain: |_| {
+            Err(Failure {
+                kind: FailureKind::Input,
+                message: String::new(),
+            })
+        },
         remove_staging: || {},
     };
 

@@ -56,7 +56,7 @@ pub fn run(check: &Check, global: &Global, work: &Work) -> Result<u8, Problem> {
 }
 
 /// `region.glb` and `bunny`: `region-bunny.glb`.
-fn one_of_many(path: &Path, id: &str) -> String {
+pub fn one_of_many(path: &Path, id: &str) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     match extension.is_empty() {

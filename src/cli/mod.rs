@@ -4,6 +4,7 @@ mod arguments;
 mod build;
 mod check;
 mod cones;
+mod explain;
 mod fit;
 mod init;
 mod interrupt;
@@ -13,6 +14,7 @@ mod plan;
 mod problem;
 mod progress;
 mod rebuild;
+mod schema;
 mod summary;
 mod terminal;
 mod texture;
@@ -73,6 +75,8 @@ fn run(arguments: &Arguments, work: &Work) -> Result<u8, Problem> {
         Command::Rebuild(rebuild) => rebuild::run(rebuild, global, work),
         Command::Fit(fit) => fit::run(fit, global, work),
         Command::Texture(texture) => texture::run(texture, global, work),
+        Command::Explain(explain) => explain::run(explain, global, work),
+        Command::Schema(asked) => schema::run(asked),
         Command::Init(init) => init::run(init, global),
     }
 }

@@ -28,6 +28,8 @@ pub struct Work {
     pub fit: fn(&FitRequest) -> Result<FitResult, Failure>,
     /// Lays a pattern over an asset's surface and writes the texture into a folder.
     pub texture: fn(&TextureRequest) -> Result<TextureResult, Failure>,
+    /// Says why an asset failed or is distorted.
+    pub explain: fn(&ExplainRequest) -> Result<Explained, Failure>,
     /// Removes folders that are being written. Called once before the program is stopped.
     pub remove_staging: fn(),
 }
@@ -134,6 +136,24 @@ pub struct TextureResult {
     pub text: String,
     /// The same for programs.
     pub json: serde_json::Value,
+}
+
+/// What `explain` is asked for.
+pub struct ExplainRequest {
+    /// A mesh, an asset's folder, or the place where an asset's folder would be.
+    pub asset: PathBuf,
+    /// The effective configuration, for a mesh.
+    pub config: Config,
+}
+
+/// What `explain` says.
+pub struct Explained {
+    /// Sentences.
+    pub text: String,
+    /// Whether the asset fails.
+    pub failed: bool,
+    /// The faces at fault in colour, where there are any.
+    pub glb: Option<Vec<u8>>,
 }
 
 /// What `rebuild` made.

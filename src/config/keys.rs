@@ -479,6 +479,16 @@ pub const KEYS: &[Key] = &[
         "pixels",
         "1024",
     ),
+    key("report.enabled", Kind::Bool, "", "true"),
+    key(
+        "report.max_faces",
+        Kind::Integer {
+            min: 0,
+            max: 4_294_967_294,
+        },
+        "faces",
+        "500000",
+    ),
     key(
         "run.threads",
         Kind::Integer { min: 0, max: 1024 },

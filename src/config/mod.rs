@@ -57,6 +57,8 @@ pub struct Config {
     pub images: ImageParams,
     /// Pictures of the result.
     pub pictures: PictureParams,
+    /// A page of each component to look at in a browser.
+    pub report: ReportParams,
     /// How the program runs; never changes a result.
     pub run: RunParams,
 }

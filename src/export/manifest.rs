@@ -15,7 +15,7 @@ use std::path::Path;
 pub const FILE_NAME: &str = "manifest.jsonl";
 
 /// What became of an asset or a component.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum State {
     /// Computed and written.
@@ -29,7 +29,7 @@ pub enum State {
 }
 
 /// The line of one asset.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Record {
     /// Name of the asset, which is also its folder.
     pub id: String,
@@ -54,7 +54,7 @@ pub struct Record {
 }
 
 /// What became of one component.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ComponentRecord {
     /// Number of the component, from 0.
     pub component: usize,

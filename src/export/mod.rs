@@ -16,10 +16,13 @@ pub mod exr;
 pub mod folder;
 pub mod gismo;
 pub mod glb;
+mod html;
+pub mod index;
 pub mod manifest;
 pub mod npz;
 pub mod periods;
 pub mod pictures;
+pub mod report;
 #[cfg(test)]
 pub(crate) mod sample;
 mod shapes;

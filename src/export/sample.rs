@@ -21,6 +21,7 @@ use crate::geometry::mesh::{
     TextureUse, triangle_area,
 };
 use crate::product::{AffineAtlas, ConnectivityRepair, Quality};
+use crate::repair::RepairLog;
 use std::f64::consts::TAU;
 
 /// Texels on the longer side of the rectangle.
@@ -272,6 +273,8 @@ impl Grid {
             repair: [("welded_vertices".to_owned(), 0)].into(),
             connectivity_repair: ConnectivityRepair::default(),
             quality,
+            repair_log: RepairLog::default(),
+            image_distance: None,
             seamless: true,
             mesh,
         }

@@ -3,9 +3,10 @@
 //! `build_component` is the pipeline of the tutorial (5.1) on one page, its first half on another (`flatten`): data only
 //! flows forward, and a finished value is never changed. [`build`] does it for every component of a mesh in memory, [`run`] for a file,
 //! [`inspect`] stops before the flow, [`survey`] tries different cones, [`rebuild`] goes back from images to a mesh, [`fit`] on to
-//! spline surfaces, [`texture`] lays a pattern over the surface.
+//! spline surfaces, [`texture`] lays a pattern over the surface, [`explain`] says what is wrong.
 
 mod error;
+pub mod explain;
 pub mod fit;
 mod flatten;
 mod inspect;
@@ -26,9 +27,9 @@ use crate::atlas::rectangles::Charted;
 use crate::atlas::{charts, develop, geometry_image, patches, rectangles};
 use crate::config::{Config, PatchParams};
 use crate::export::folder::{Staging, component_name, list_files};
-use crate::export::{self, ExportError, Provenance, pictures};
+use crate::export::{self, ExportError, Provenance, pictures, report as report_page};
 use crate::flow::cones::{self, Requests};
-use crate::geometry::deviation::Triangles;
+use crate::geometry::deviation::{Triangles, distances};
 use crate::geometry::mesh::Soup;
 use crate::observe::Observer;
 use crate::outcome::{AssetOutcome, AssetState, ComponentOutcome, Failure, Summary};
@@ -165,11 +166,22 @@ fn build_component(
         faces: &given_faces,
     };
     let readable = Images::new(&patches, &images, image_origin);
-    let quality = report::measure_images(quality, given, &readable, topology);
+    let (quality, rebuilt) = report::measure_images(quality, given, &readable, topology);
+    let image_distance = rebuilt
+        .filter(|_| config.report.enabled)
+        .and_then(|rebuilt| {
+            let rebuilt = Triangles {
+                positions: &rebuilt.positions,
+                faces: &rebuilt.faces,
+            };
+            distances(mesh.positions.as_slice(), rebuilt)
+        });
     Ok(AffineAtlas {
         topology,
         seamless: report::is_seamless(&charts),
         repair: component.log.counts(),
+        repair_log: component.log,
+        image_distance: image_distance.map(Into::into),
         flow: config.flow.clone(),
         mesh,
         prescription,
@@ -334,6 +346,10 @@ fn write(
         go_on()?;
         if config.pictures.enabled {
             pictures::write(&staging, &subfolder, atlas, config.pictures.size)?;
+        }
+        go_on()?;
+        if config.report.enabled {
+            report_page::write(&staging, &subfolder, atlas, &provenance, &config.report)?;
         }
         go_on()?;
     }

@@ -19,6 +19,7 @@
 //! | `gltf` | glTF 2.0 and GLB with its compression extensions |
 //! | `atlas` | images and seams of a folder that a build wrote |
 //! | `flat` | flat coordinates and patches of such a folder |
+//! | `metric` | flat lengths and cones of such a folder |
 //! | `npz`, `exr`, `bounded` | the formats in such a folder |
 //!
 //! The four small formats are read here rather than by crates: none that we know gives errors with
@@ -32,6 +33,7 @@ pub(crate) mod exr;
 pub mod flat;
 mod folder;
 mod gltf;
+pub mod metric;
 pub(crate) mod npz;
 mod obj;
 mod off;

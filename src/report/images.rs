@@ -4,7 +4,7 @@ use crate::geometry::connectivity::Topology;
 use crate::geometry::deviation::{Sampling, Triangles, deviation};
 use crate::geometry::mesh::{bounding_box, distance};
 use crate::product::{MeanMax, Quality};
-use crate::rebuild::{Images, rebuild};
+use crate::rebuild::{Images, Rebuilt, rebuild};
 
 /// Samples on each side. The RMS of so many is off by a few per cent at most (0.2 dB); more would cost more than they tell.
 const SAMPLING: Sampling = Sampling {
@@ -12,14 +12,14 @@ const SAMPLING: Sampling = Sampling {
     vertices: 20_000,
 };
 
-/// Fills in what is measured on images; `source` is the surface after repair. Nothing where the images do not make a mesh
-/// of the surface's topology, which is said as a warning: charts and transitions are as good as they are.
+/// Fills in what is measured on images, and gives the mesh rebuilt from them; `source` is the surface after repair. Nothing where
+/// the images do not make a mesh of the surface's topology, which is said as a warning: charts and transitions are as good as they are.
 pub fn measure_images(
     quality: Quality,
     source: Triangles<'_>,
     images: &Images<'_>,
     topology: Topology,
-) -> Quality {
+) -> (Quality, Option<Rebuilt>) {
     let rebuilt = rebuild(images).and_then(|mesh| {
         let Topology {
             euler_characteristic,
@@ -34,7 +34,7 @@ pub fn measure_images(
         Ok(mesh) => mesh,
         Err(error) => {
             tracing::warn!(%error, "the images could not be measured");
-            return quality;
+            return (quality, None);
         }
     };
     let rebuilt = Triangles {
@@ -42,10 +42,10 @@ pub fn measure_images(
         faces: &mesh.faces,
     };
     let Some(found) = deviation(source, rebuilt, SAMPLING) else {
-        return quality;
+        return (quality, Some(mesh));
     };
     let (low, high) = bounding_box(source.positions);
-    Quality {
+    let quality = Quality {
         image_psnr_db: found.psnr(distance(low, high)),
         image_hausdorff: Some(found.hausdorff),
         image_normal_error: Some(MeanMax {
@@ -53,5 +53,6 @@ pub fn measure_images(
             max: found.max_normal_angle,
         }),
         ..quality
-    }
+    };
+    (quality, Some(mesh))
 }

@@ -33,6 +33,29 @@ fn assert_default_cones(document: &serde_json::Value, genus: u32, loops: u32) {
     assert!(loops > 0 || (sum - required).abs() < 1e-9, "{sum}");
 }
 
+/// Every figure of the page is the one of the document.
+fn assert_same_figures(report: &[u8], document: &serde_json::Value) {
+    let text = std::str::from_utf8(report).expect("UTF-8");
+    let mut figures = 0;
+    for rest in text.split("data-key=\"").skip(1) {
+        let (key, rest) = rest.split_once("\" data-value=\"").expect("a value");
+        let (value, _) = rest.split_once('"').expect("an end");
+        let shown: serde_json::Value = serde_json::from_str(value).expect("JSON");
+        assert_eq!(Some(&shown), document.pointer(key), "{key}");
+        figures += 1;
+    }
+    assert!(figures > 20, "{figures} figures");
+    for name in ["cones", "segments", "transitions", "patches"] {
+        let (_, rest) = text
+            .split_once(&format!("<table id=\"{name}\""))
+            .expect(name);
+        let (rows, _) = rest.split_once("</tbody>").expect("an end");
+        let (_, rows) = rows.split_once("<tbody>").expect("a body");
+        let stated = document[name].as_array().expect("a list").len();
+        assert_eq!(rows.matches("<tr>").count(), stated, "{name}");
+    }
+}
+
 fn one_and_two_threads(fixture: &str, genus: u32, loops: u32) {
     let mesh = format!("fixtures/good/{fixture}");
     let run = |threads: &str| {
@@ -59,9 +82,16 @@ fn one_and_two_threads(fixture: &str, genus: u32, loops: u32) {
         assert!(bytes == &second[file], "{file} depends on the threads");
         assert!(!bytes.is_empty(), "{file} is empty");
     }
-    for file in ["atlas.json", "atlas.npz", "surface.glb", "images/0000.exr"] {
+    for file in [
+        "atlas.json",
+        "atlas.npz",
+        "surface.glb",
+        "images/0000.exr",
+        "report.html",
+    ] {
         assert!(first.contains_key(file), "{file} is missing");
     }
+    assert_same_figures(&first["report.html"], &document);
     for picture in ["preview", "layout", "log-scale", "convergence"] {
         assert!(first.contains_key(&format!("{picture}.png")), "{picture}");
     }
@@ -122,4 +152,16 @@ fn three_boundaries_rabbit() {
 fn no_good_fixture_is_left_out() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/good");
     assert_eq!(std::fs::read_dir(folder).expect("committed").count(), 7);
+}
+
+#[test]
+fn a_report_that_nobody_wants_is_not_there() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mesh = Path::new("fixtures/good/genus-0-cube.obj");
+    let output = build_into(folder.path(), mesh, &["report.enabled=false"]);
+    assert_eq!(output.status.code(), Some(0));
+    let written = files(&folder.path().join("genus-0-cube"));
+    assert!(written.contains_key("atlas.json") && !written.contains_key("report.html"));
+    let index = std::fs::read_to_string(folder.path().join("index.html")).expect("written");
+    assert!(index.contains("genus-0-cube") && !index.contains("report.html\""));
 }

@@ -1,5 +1,6 @@
 //! Ctrl-C in the middle of a build.
 
+use crate::OF_THE_RUN;
 use crate::command::{build_into, program};
 use crate::good::files;
 use std::collections::BTreeMap;
@@ -105,7 +106,7 @@ fn interrupt_at(stage: &str) {
                 .to_string_lossy()
                 .into_owned()
         })
-        .filter(|name| name != "mesh" && name != "manifest.jsonl")
+        .filter(|name| name != "mesh" && !OF_THE_RUN.contains(&name.as_str()))
         .collect();
     assert!(left.is_empty(), "{left:?} stayed behind");
 }

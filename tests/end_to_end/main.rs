@@ -18,3 +18,6 @@ mod refusals;
 mod replacing;
 mod survey;
 mod texture;
+
+/// Files of the run as a whole, beside the folders of assets.
+const OF_THE_RUN: [&str; 3] = ["manifest.jsonl", "index.html", "history.jsonl"];

@@ -8,11 +8,13 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// The whole document.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Document {
     /// `"affine-atlas"`.
+    #[schemars(extend("const" = "affine-atlas"))]
     pub format: String,
-    /// [`super::FORMAT_VERSION`].
+    /// Version of the format.
+    #[schemars(extend("const" = super::FORMAT_VERSION))]
     pub version: u32,
     /// Program that wrote it.
     pub generator: Generator,
@@ -53,7 +55,7 @@ pub struct Document {
 }
 
 /// Program that wrote the atlas.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Generator {
     /// Name of the program.
     pub name: String,
@@ -62,7 +64,7 @@ pub struct Generator {
 }
 
 /// What the atlas was made from.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Source {
     /// Input file as given; never absolute.
     pub path: String,
@@ -79,7 +81,7 @@ pub struct Source {
 }
 
 /// A run of vertices and faces of the input.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct SourcePart {
     /// Node, mesh and primitive, or the object name.
     pub name: String,
@@ -94,7 +96,7 @@ pub struct SourcePart {
 }
 
 /// Units of all numbers.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Units {
     /// Lengths and coordinates: `"source"`, those of the input.
     pub length: String,
@@ -103,7 +105,7 @@ pub struct Units {
 }
 
 /// Counts that do not depend on the metric.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Topology {
     /// Number of vertices.
     pub vertices: usize,
@@ -120,7 +122,7 @@ pub struct Topology {
 }
 
 /// What happened on the boundary.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Boundary {
     /// The surface is closed.
@@ -136,7 +138,7 @@ pub enum Boundary {
 }
 
 /// The flat metric and how it was reached.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Metric {
     /// Conformal structure.
     pub scheme: Scheme,
@@ -162,7 +164,7 @@ pub struct Metric {
 }
 
 /// A vertex of prescribed curvature.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Cone {
     /// Row of `positions`.
     pub vertex: usize,
@@ -173,7 +175,7 @@ pub struct Cone {
 }
 
 /// A rigid motion of the plane: p ↦ R(rotation) p + translation.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Motion {
     /// Angle in (−π, π].
     pub rotation: f64,
@@ -187,7 +189,7 @@ pub struct Motion {
 }
 
 /// A chain of cut edges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Segment {
     /// Number, as in the array `segment`.
     pub id: usize,
@@ -202,7 +204,7 @@ pub struct Segment {
 }
 
 /// A chart.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Chart {
     /// Number, as in `chart_offset`.
     pub id: usize,
@@ -212,7 +214,7 @@ pub struct Chart {
 }
 
 /// What a chart covers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum ChartDomain {
     /// The slit disk.
@@ -230,7 +232,7 @@ pub enum ChartDomain {
 }
 
 /// A transition from one chart to another on one sector.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Transition {
     /// Chart whose coordinates go in.
     pub from: u32,
@@ -246,7 +248,7 @@ pub struct Transition {
 }
 
 /// The domain of one geometry image.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Patch {
     /// Number, as in the array `patch`.
     pub id: usize,
@@ -267,7 +269,7 @@ pub struct Patch {
 }
 
 /// What the images hold.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Images {
     /// Groups of channels beside position and mask, as `images.channels` names them; those that the source lacks are not there.
     pub channels: Vec<Channel>,
@@ -279,7 +281,7 @@ pub struct Images {
 }
 
 /// One image of all patches: in it, each patch's image lies texel for texel.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Packed {
     /// The image, relative to the folder.
     pub image: String,
@@ -290,7 +292,7 @@ pub struct Packed {
 }
 
 /// p ↦ scale · R(rotation) p + translation.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Similarity {
     /// Positive factor.
     pub scale: f64,
@@ -301,7 +303,7 @@ pub struct Similarity {
 }
 
 /// p ↦ scale · p + translation.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Packing {
     /// Positive factor.
     pub scale: f64,
@@ -310,7 +312,7 @@ pub struct Packing {
 }
 
 /// Properties of the whole atlas.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Flags {
     /// True where every gluing is a quarter turn to 1e-8.
     pub seamless: bool,

@@ -11,7 +11,7 @@
 
 mod unfinished;
 
-use crate::export::{Action, ExportError};
+use crate::export::{Action, ExportError, index};
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -331,7 +331,7 @@ fn asset_name(name: &str) -> Result<&str, ExportError> {
     let bad = name.is_empty()
         || name.starts_with('.')
         || name.contains(['/', '\\', '\0'])
-        || name == "manifest.jsonl";
+        || ["manifest.jsonl", index::FILE_NAME, index::HISTORY_NAME].contains(&name);
     if bad {
         return Err(ExportError::AssetName { name: name.into() });
     }

@@ -9,6 +9,7 @@
 //! *Not guaranteed:* double precision. Positions are 32-bit floats relative to the node's translation,
 //! so tiny faces may collapse; `atlas.npz` has the surface in full.
 
+pub mod marked;
 mod materials;
 pub mod rebuilt;
 pub mod region;

@@ -9,7 +9,7 @@ use crate::product::AffineAtlas;
 /// Cells of the checkerboard along the diagonal of the surface, at its middle scale.
 const CELLS: f64 = 44.0;
 /// Cells may shrink and grow by these powers of two before their size is changed.
-const CELL_RANGE: [f64; 2] = [-1.3, 1.7];
+pub const CELL_RANGE: [f64; 2] = [-1.3, 1.7];
 
 /// The checkerboard: where which cell lies, and how large cells are.
 pub struct Checkerboard<'a> {
@@ -68,8 +68,7 @@ impl Checkerboard<'_> {
         let level: f64 = (0..3)
             .map(|k| weights[k] * self.level[corners[k].index()])
             .sum();
-        // Cells that are 2^excess too large are cut, those too small are joined.
-        let excess = level - level.clamp(CELL_RANGE[0], CELL_RANGE[1]);
+        let excess = excess(level);
         let step = excess.floor();
         let fade = (((excess - step) - 0.47) / 0.06).clamp(0.0, 1.0);
         let cell = self.cell * (-step).exp2();
@@ -79,6 +78,22 @@ impl Checkerboard<'_> {
         let pixels = self.side * (level - step).exp2() / footprint;
         let contrast = ((pixels - 1.5) / 2.0).clamp(0.0, 1.0);
         mix(LIGHT, DARK, (0.5 + (dark - 0.5) * contrast) as f32)
+    }
+
+    /// log₂ of a cell's side in space at each vertex, relative to the middle.
+    pub fn levels(&self) -> &[f64] {
+        &self.level
+    }
+
+    /// Side of a cell in flat units where cells are cut into 2^`step` times smaller ones.
+    pub fn cell(&self, step: f64) -> f64 {
+        self.cell * (-step).exp2()
+    }
+
+    /// [`Checkerboard::place`] of the corners of a face.
+    pub fn corners(&self, f: FaceId, cell: f64) -> [[f64; 2]; 3] {
+        const CORNERS: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        CORNERS.map(|weights| self.place(f, weights, cell))
     }
 
     /// Central-chart coordinates of a point of a face, up to an even number of cells.
@@ -101,6 +116,11 @@ impl Checkerboard<'_> {
         let turned = rotate(at, motion.rotation);
         std::array::from_fn(|i| motion.scale * turned[i] + motion.translation[i] % (2.0 * cell))
     }
+}
+
+/// By how many powers of two cells at this level are too large (positive) or too small: those are cut, these joined.
+pub fn excess(level: f64) -> f64 {
+    level - level.clamp(CELL_RANGE[0], CELL_RANGE[1])
 }
 
 /// The value below which the given share of the weight lies, of values in ascending order with their weights; 0 where

@@ -20,7 +20,7 @@
 //! Not guaranteed: equal bytes on different platforms (sines and powers differ in the last bit).
 
 mod canvas;
-mod checkerboard;
+pub(crate) mod checkerboard;
 mod coarse;
 pub(crate) mod colour;
 mod convergence;
@@ -30,7 +30,7 @@ mod layout;
 mod light;
 mod paint;
 mod raster;
-mod scale;
+pub(crate) mod scale;
 mod scene;
 mod studio;
 mod surface;

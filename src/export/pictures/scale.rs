@@ -9,7 +9,7 @@ use image::{Rgb, RgbImage};
 
 /// Which values get which colours.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Range {
+pub(crate) struct Range {
     /// The pale middle: the median over the area.
     pub middle: f64,
     /// What is so far from it gets the ends of the scale.

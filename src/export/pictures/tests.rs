@@ -162,6 +162,8 @@ fn torus(n: u32, m: u32, k: f64) -> AffineAtlas {
         repair: Default::default(),
         connectivity_repair: ConnectivityRepair::default(),
         quality: Quality::default(),
+        repair_log: Default::default(),
+        image_distance: None,
         seamless: false,
         mesh: Mesh {
             source_vertex: (0..vertices as u32).collect(),

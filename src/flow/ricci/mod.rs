@@ -40,7 +40,16 @@ use crate::observe::Observer;
 use std::f64::consts::PI;
 
 /// One line of the convergence record.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    serde::Serialize,
+    serde::Deserialize,
+    schemars::JsonSchema,
+)]
 pub struct FlowStep {
     /// Number of the iteration, 0 for the state before the first.
     pub iteration: usize,
@@ -58,7 +67,9 @@ pub struct FlowStep {
 }
 
 /// How well a circle packing keeps the lengths in space (1).
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
 pub struct PackingFit {
     /// Mean over the edges of |l − l̄| / l̄.
     pub mean_length_error: f64,

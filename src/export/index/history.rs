@@ -1,0 +1,57 @@
+//! What a run leaves for the next one to compare with: one line of JSON an asset.
+
+use super::HISTORY_NAME;
+use super::figures::{Asset, Figures};
+use crate::export::manifest::State;
+use crate::export::{Action, ExportError};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::{fs, io};
+
+/// An asset at the end of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Past {
+    /// Its id.
+    pub id: String,
+    /// What became of it.
+    pub state: State,
+    /// BLAKE3 hash of the input, hexadecimal.
+    pub input_hash: Option<String>,
+    /// BLAKE3 hash of the configuration, hexadecimal.
+    pub config_hash: String,
+    /// Figures of its atlases, where there are any.
+    pub figures: Option<Figures>,
+}
+
+/// The run before; nothing where there was none. Lines that are no records, such as those of another version, count as not there.
+pub(super) fn load(output_root: &Path) -> Result<BTreeMap<String, Past>, ExportError> {
+    let path = output_root.join(HISTORY_NAME);
+    let bytes = match fs::read(&path) {
+        Ok(bytes) => bytes,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
+        Err(error) => return Err(ExportError::io(Action::Read, &path)(error)),
+    };
+    let lines = bytes.split(|&b| b == b'\n');
+    let known = lines.filter_map(|line| serde_json::from_slice::<Past>(line).ok());
+    Ok(known.map(|past| (past.id.clone(), past)).collect())
+}
+
+/// The text of the file.
+pub(super) fn to_text(assets: &[Asset<'_>]) -> String {
+    let mut text = String::new();
+    for asset in assets {
+        let past = Past {
+            id: asset.record.id.clone(),
+            state: asset.record.state,
+            input_hash: asset.record.input_hash.clone(),
+            config_hash: asset.record.config_hash.clone(),
+            figures: asset.figures.clone(),
+        };
+        let line = serde_json::to_string(&past)
+            .expect("string keys and no custom serialiser, so that serialisation cannot fail");
+        text.push_str(&line);
+        text.push('\n');
+    }
+    text
+}

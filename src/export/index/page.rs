@@ -1,0 +1,303 @@
+//! The page itself.
+
+use super::changes::{Change, Changes, WORSE_BY, WORSE_FACTOR};
+use super::figures::Asset;
+use crate::export::html::{self, escape, figure, link};
+use crate::export::manifest::State;
+use crate::export::report;
+use std::fmt::Write as _;
+
+const STYLE: &str = include_str!("index.css");
+const SCRIPT: &str = include_str!("index.js");
+
+/// Rows of the lists of slowest and worst.
+const LEADING: usize = 10;
+/// Links to reports that stand beside an asset; one of many components has more.
+const REPORTS: usize = 3;
+
+fn name(state: State) -> &'static str {
+    match state {
+        State::Built => "built",
+        State::Cached => "cached",
+        State::Failed => "failed",
+        State::Cancelled => "cancelled",
+    }
+}
+
+/// A sign beside the word, so that states differ without colour.
+fn sign(state: State) -> &'static str {
+    match state {
+        State::Built => "●",
+        State::Cached => "○",
+        State::Failed => "✕",
+        State::Cancelled => "–",
+    }
+}
+
+/// The whole page.
+pub(super) fn page(assets: &[Asset<'_>], changes: &Changes) -> String {
+    let mut body = String::from("<h1>Atlases</h1>\n");
+    counts(&mut body, assets);
+    compared(&mut body, assets, changes);
+    failures(&mut body, assets);
+    leading(&mut body, assets);
+    all(&mut body, assets, changes);
+    let version = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
+    let _ = writeln!(
+        body,
+        "<p class=\"soft\">Written by {version} from manifest.jsonl and the atlas.json of each asset.</p>"
+    );
+    html::page("Atlases", STYLE, &body, &[html::TABLES, SCRIPT])
+}
+
+fn counts(body: &mut String, assets: &[Asset<'_>]) {
+    let seconds: f64 = assets.iter().map(|a| a.record.seconds).sum();
+    let _ = writeln!(
+        body,
+        "<p>{} assets, {} of work together.</p>\n<div class=\"counts\" role=\"group\" aria-label=\"Show assets by state\">",
+        assets.len(),
+        duration(seconds)
+    );
+    let _ = writeln!(
+        body,
+        "<button type=\"button\" data-state=\"\" aria-pressed=\"true\"><b>{}</b> all</button>",
+        assets.len()
+    );
+    for state in [State::Failed, State::Cancelled, State::Built, State::Cached] {
+        let count = assets.iter().filter(|a| a.record.state == state).count();
+        let _ = writeln!(
+            body,
+            "<button type=\"button\" class=\"{0}\" data-state=\"{0}\" aria-pressed=\"false\"><b>{count}</b> {1} {0}</button>",
+            name(state),
+            sign(state)
+        );
+    }
+    body.push_str("</div>\n");
+}
+
+/// Seconds as people say them.
+pub(super) fn duration(seconds: f64) -> String {
+    let whole = seconds.clamp(0.0, 1e12).round() as u64;
+    match (whole / 3600, whole / 60 % 60) {
+        (0, 0) => format!("{seconds:.1} s"),
+        (0, minutes) => format!("{minutes} min {} s", whole % 60),
+        (hours, minutes) => format!("{hours} h {minutes} min"),
+    }
+}
+
+/// The id with a link to its folder, and to its reports.
+fn linked(asset: &Asset<'_>) -> String {
+    let id = &asset.record.id;
+    if asset.record.files.is_empty() {
+        return escape(id);
+    }
+    let mut out = format!("<a href=\"{}\">{}</a>", link(&format!("{id}/")), escape(id));
+    let ending = format!("/{}", report::FILE_NAME);
+    let reports: Vec<&String> = (asset.record.files.iter())
+        .filter(|file| file.ends_with(&ending))
+        .collect();
+    for (i, file) in reports.iter().take(REPORTS).enumerate() {
+        let words = match reports.len() {
+            1 => "report".to_owned(),
+            _ => format!("report {i}"),
+        };
+        let _ = write!(out, " · <a href=\"{}\">{words}</a>", link(file));
+    }
+    if reports.len() > REPORTS {
+        let _ = write!(out, " · {} more", reports.len() - REPORTS);
+    }
+    out
+}
+
+fn sentence(asset: &Asset<'_>) -> String {
+    let record = asset.record;
+    let kind = record.kind.map_or("", |kind| kind.name());
+    let error = record.error.as_deref().unwrap_or("no reason was recorded");
+    let kept = match record.files.is_empty() {
+        true => "",
+        false => " <span class=\"soft\">– the result of an earlier run is still in place</span>",
+    };
+    format!("<b>{kind}</b>: {}{kept}", escape(error))
+}
+
+fn compared(body: &mut String, assets: &[Asset<'_>], changes: &Changes) {
+    body.push_str("<h2>Changes against the run before</h2>\n");
+    if !changes.compared {
+        body.push_str("<p>There was none.</p>\n");
+        return;
+    }
+    let mut any = false;
+    type Belongs = fn(Change) -> bool;
+    let groups: [(&str, Belongs); 4] = [
+        ("New failures", |c| c == Change::NewFailure),
+        ("Fixed", |c| c == Change::Fixed),
+        ("Worse distortion", |c| matches!(c, Change::Worse(..))),
+        ("New", |c| c == Change::New),
+    ];
+    for (title, is_in) in groups {
+        let rows: Vec<(&Asset<'_>, Change)> = (assets.iter().zip(&changes.of))
+            .filter_map(|(asset, change)| Some((asset, (*change)?)))
+            .filter(|&(_, change)| is_in(change))
+            .collect();
+        if rows.is_empty() {
+            continue;
+        }
+        any = true;
+        let note = match rows[0].1 {
+            Change::Worse(..) => format!(
+                " <span class=\"soft\">(area distortion more than {WORSE_FACTOR} times what it was, and {WORSE_BY} more)</span>"
+            ),
+            _ => String::new(),
+        };
+        let open = match rows[0].1 {
+            Change::New => "",
+            _ => " open",
+        };
+        let _ = writeln!(
+            body,
+            "<details class=\"change\"{open}><summary><b>{}</b> {title}{note}</summary><ul>",
+            rows.len()
+        );
+        for (asset, change) in rows {
+            let more = match change {
+                Change::NewFailure => format!(": {}", sentence(asset)),
+                Change::Worse(old, new) => format!(": {} → {}", figure(old), figure(new)),
+                Change::Fixed | Change::New => String::new(),
+            };
+            let _ = writeln!(body, "<li>{}{more}</li>", linked(asset));
+        }
+        body.push_str("</ul></details>\n");
+    }
+    if !changes.removed.is_empty() {
+        any = true;
+        let _ = writeln!(
+            body,
+            "<details class=\"change\"><summary><b>{}</b> Removed</summary><ul>",
+            changes.removed.len()
+        );
+        for id in &changes.removed {
+            let _ = writeln!(body, "<li>{}</li>", escape(id));
+        }
+        body.push_str("</ul></details>\n");
+    }
+    if !any {
+        body.push_str("<p>None.</p>\n");
+    }
+}
+
+fn failures(body: &mut String, assets: &[Asset<'_>]) {
+    let failed: Vec<&Asset<'_>> = (assets.iter())
+        .filter(|a| a.record.state == State::Failed)
+        .collect();
+    if failed.is_empty() {
+        return;
+    }
+    let _ = write!(
+        body,
+        "<h2>Failures</h2>\n<details open><summary><b>{}</b> failed</summary><ul id=\"failures\">\n",
+        failed.len()
+    );
+    for asset in failed {
+        let _ = writeln!(body, "<li>{}: {}</li>", linked(asset), sentence(asset));
+    }
+    body.push_str("</ul></details>\n");
+}
+
+/// The slowest, and those with the worst distortion.
+fn leading(body: &mut String, assets: &[Asset<'_>]) {
+    let mut slowest: Vec<(&Asset<'_>, f64)> = (assets.iter())
+        .filter(|a| a.record.state != State::Cached)
+        .map(|a| (a, a.record.seconds))
+        .collect();
+    let mut worst: Vec<(&Asset<'_>, f64)> = (assets.iter())
+        .filter_map(|a| Some((a, a.figures.as_ref()?.area_distortion)))
+        .collect();
+    body.push_str("<div class=\"leading\">\n");
+    for (title, unit, rows) in [
+        ("Slowest", " s", &mut slowest),
+        ("Worst area distortion", "", &mut worst),
+    ] {
+        rows.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let _ = write!(body, "<section><h2>{title}</h2>\n<ol>\n");
+        for (asset, value) in rows.iter().take(LEADING) {
+            let _ = writeln!(body, "<li>{}: {}{unit}</li>", linked(asset), figure(*value));
+        }
+        body.push_str("</ol></section>\n");
+    }
+    body.push_str("</div>\n");
+}
+
+fn all(body: &mut String, assets: &[Asset<'_>], changes: &Changes) {
+    body.push_str(
+        "<h2 id=\"all\">All assets</h2>\n<form id=\"filter\" role=\"search\"><label>Find <input type=\"search\" name=\"text\" autocomplete=\"off\" placeholder=\"id, kind, words of a failure\"></label> <output id=\"shown\" aria-live=\"polite\"></output></form>\n\
+         <div class=\"scroll tall\" tabindex=\"0\" role=\"region\" aria-label=\"All assets\"><table id=\"assets\" data-sortable><thead><tr>",
+    );
+    let heads = [
+        "asset",
+        "state",
+        "change",
+        "#seconds",
+        "#memory [MB]",
+        "#faces",
+        "#genus",
+        "#loops",
+        "#cones",
+        "#patches",
+        "#area distortion",
+        "#log scale, std",
+        "#angle error [rad]",
+        "#images [dB]",
+        "kind",
+    ];
+    for head in heads {
+        let _ = match head.strip_prefix('#') {
+            Some(words) => write!(body, "<th scope=\"col\" class=\"number\">{words}</th>"),
+            None => write!(body, "<th scope=\"col\">{head}</th>"),
+        };
+    }
+    body.push_str("</tr></thead><tbody>\n");
+    for (asset, change) in assets.iter().zip(&changes.of) {
+        row(body, asset, *change);
+    }
+    body.push_str("</tbody></table></div>\n");
+}
+
+fn row(body: &mut String, asset: &Asset<'_>, change: Option<Change>) {
+    let record = asset.record;
+    let state = name(record.state);
+    let error = record.error.as_deref().unwrap_or_default();
+    let _ = write!(
+        body,
+        "<tr data-state=\"{state}\" data-words=\"{}\"><td data-value=\"{}\">{}</td><td class=\"{state}\" data-value=\"{state}\">{} {state}</td><td>{}</td>",
+        escape(error),
+        escape(&record.id),
+        linked(asset),
+        sign(record.state),
+        change.map_or("", Change::name)
+    );
+    let mut number = |value: Option<f64>, words: &dyn Fn(f64) -> String| {
+        let _ = match value {
+            Some(value) => write!(
+                body,
+                "<td class=\"number\" data-value=\"{value:?}\">{}</td>",
+                words(value)
+            ),
+            None => write!(body, "<td class=\"number\" data-value=\"\">–</td>"),
+        };
+    };
+    let whole = |x: f64| format!("{x:.0}");
+    number(Some(record.seconds), &|x| format!("{x:.2}"));
+    number(record.peak_memory.map(|bytes| bytes as f64 / 1e6), &whole);
+    let of = asset.figures.as_ref();
+    number(of.map(|f| f.faces as f64), &whole);
+    number(of.map(|f| f.genus as f64), &whole);
+    number(of.map(|f| f.boundary_loops as f64), &whole);
+    number(of.map(|f| f.cones as f64), &whole);
+    number(of.map(|f| f.patches as f64), &whole);
+    number(of.map(|f| f.area_distortion), &figure);
+    number(of.map(|f| f.log_scale_std), &figure);
+    number(of.map(|f| f.angle_error_mean), &figure);
+    number(of.and_then(|f| f.image_psnr_db), &|x| format!("{x:.1}"));
+    let kind = record.kind.map_or("", |kind| kind.name());
+    let _ = writeln!(body, "<td>{kind}</td></tr>");
+}

@@ -1,0 +1,170 @@
+use super::*;
+use crate::export::manifest::{Record, State};
+use crate::outcome::FailureKind;
+use std::fs;
+
+fn record(id: &str, state: State) -> Record {
+    let failed = state == State::Failed;
+    Record {
+        id: id.into(),
+        input_hash: Some("00".into()),
+        config_hash: "ff".into(),
+        state,
+        kind: failed.then_some(FailureKind::Prescription),
+        error: failed.then(|| "the total is <b>4</b>, 2 & more".into()),
+        seconds: 1.5,
+        peak_memory: Some(3 << 20),
+        files: match failed {
+            true => Vec::new(),
+            false => vec![format!("{id}/atlas.json"), format!("{id}/report.html")],
+        },
+        components: Vec::new(),
+    }
+}
+
+/// An output root whose assets have these states and area distortions.
+fn night(root: &Path, assets: &[(&str, State, f64)]) -> (Manifest, String) {
+    let mut manifest = Manifest::default();
+    for &(id, state, distortion) in assets {
+        manifest.insert(record(id, state));
+        let folder = root.join(id);
+        fs::create_dir_all(&folder).unwrap();
+        let document = serde_json::json!({
+            "topology": {"faces": 20, "genus": 1, "boundary_loops": 0, "vertices": 1},
+            "cones": [{}, {}],
+            "patches": [{}],
+            "quality": {
+                "area_distortion": distortion,
+                "log_scale": {"std": 0.25, "min": -1.0},
+                "angle_error": {"mean": 0.125},
+            },
+        });
+        fs::write(folder.join("atlas.json"), document.to_string()).unwrap();
+    }
+    write(root, &manifest).unwrap();
+    let text = fs::read_to_string(root.join(FILE_NAME)).unwrap();
+    (manifest, text)
+}
+
+/// The text of a group of changes.
+fn group<'a>(text: &'a str, title: &str) -> Option<&'a str> {
+    let start = text.find(&format!("</b> {title}"))?;
+    let end = text[start..].find("</details>")?;
+    Some(&text[start..start + end])
+}
+
+#[test]
+fn changes_are_told_from_the_run_before() {
+    use State::{Built, Cached, Failed};
+    let root = tempfile::tempdir().unwrap();
+    let (_, first) = night(
+        root.path(),
+        &[
+            ("breaks", Built, 0.1),
+            ("broken", Failed, 0.0),
+            ("gone", Built, 0.1),
+            ("mended", Failed, 0.0),
+            ("same", Built, 0.1),
+            ("worse", Built, 0.1),
+        ],
+    );
+    assert!(first.contains("There was none."));
+    let (_, second) = night(
+        root.path(),
+        &[
+            ("breaks", Failed, 0.1),
+            ("broken", Failed, 0.0),
+            ("fresh", Built, 0.1),
+            ("freshly-broken", Failed, 0.1),
+            ("mended", Built, 0.1),
+            ("same", Cached, 0.1),
+            ("worse", Built, 0.5),
+        ],
+    );
+    let of = |title: &str| group(&second, title).unwrap_or_else(|| panic!("no {title}"));
+    let failures = of("New failures");
+    assert!(failures.contains("breaks") && failures.contains("freshly-broken"));
+    assert_eq!(failures.matches("<li>").count(), 2);
+    assert!(failures.contains("the total is &lt;b&gt;4&lt;/b&gt;, 2 &amp; more"));
+    assert!(of("Fixed").contains("mended"));
+    assert!(of("Worse").contains("0.1000 → 0.5000"));
+    assert!(of("New</summary>").contains(">fresh<"));
+    assert!(of("Removed").contains("gone"));
+    // New failures stand first.
+    let place = |title: &str| second.find(&format!("</b> {title}")).unwrap();
+    assert!(place("New failures") < place("Fixed") && place("Fixed") < place("Worse"));
+    // Nothing changes in a run that changes nothing.
+    let (_, third) = night(
+        root.path(),
+        &[
+            ("breaks", Failed, 0.1),
+            ("broken", Failed, 0.0),
+            ("fresh", Cached, 0.1),
+            ("freshly-broken", Failed, 0.1),
+            ("mended", Cached, 0.1),
+            ("same", Cached, 0.1),
+            ("worse", Cached, 0.5),
+        ],
+    );
+    assert!(third.contains("<p>None.</p>"), "{third}");
+}
+
+#[test]
+fn durations_are_read_at_a_glance() {
+    for (seconds, words) in [
+        (0.04, "0.0 s"),
+        (59.4, "59.4 s"),
+        (61.0, "1 min 1 s"),
+        (7_260.0, "2 h 1 min"),
+        (f64::NAN, "NaN s"),
+    ] {
+        assert_eq!(page::duration(seconds), words);
+    }
+}
+
+#[test]
+fn cached_assets_are_not_read_again() {
+    let root = tempfile::tempdir().unwrap();
+    night(root.path(), &[("spot", State::Built, 0.125)]);
+    fs::remove_file(root.path().join("spot/atlas.json")).unwrap();
+    let mut manifest = Manifest::default();
+    manifest.insert(record("spot", State::Cached));
+    write(root.path(), &manifest).unwrap();
+    let text = fs::read_to_string(root.path().join(FILE_NAME)).unwrap();
+    assert!(text.contains("data-value=\"0.125\""));
+    // With another input the figures are another's.
+    let mut other = record("spot", State::Cached);
+    other.input_hash = Some("11".into());
+    manifest.insert(other);
+    write(root.path(), &manifest).unwrap();
+    let text = fs::read_to_string(root.path().join(FILE_NAME)).unwrap();
+    assert!(!text.contains("data-value=\"0.125\""));
+}
+
+#[test]
+fn hostile_names_and_messages_stay_text() {
+    let root = tempfile::tempdir().unwrap();
+    let mut manifest = Manifest::default();
+    let mut hostile = record("<script>alert(1)", State::Failed);
+    hostile.error = Some("\"><img src=x onerror=alert(1)>".into());
+    hostile.files = vec!["<script>alert(1)/a \"b\"/report.html".into()];
+    manifest.insert(hostile);
+    let mut outside = record("..", State::Built);
+    outside.files = vec!["../secret/atlas.json".into()];
+    manifest.insert(outside);
+    write(root.path(), &manifest).unwrap();
+    let text = fs::read_to_string(root.path().join(FILE_NAME)).unwrap();
+    assert!(!text.contains("<script>alert") && !text.contains("<img"));
+    assert!(text.contains("href=\"./%3Cscript%3Ealert%281%29/a%20%22b%22/report.html\""));
+    assert!(!text.contains("http://") && !text.contains("https://"));
+}
+
+#[test]
+fn lines_that_are_no_history_are_not_there() {
+    let root = tempfile::tempdir().unwrap();
+    fs::write(root.path().join(HISTORY_NAME), "garbage\n{\"id\":3}\n\u{0}").unwrap();
+    let (_, text) = night(root.path(), &[("spot", State::Built, 0.1)]);
+    assert!(text.contains("There was none."));
+    let history = fs::read_to_string(root.path().join(HISTORY_NAME)).unwrap();
+    assert_eq!(history.lines().count(), 1);
+}
