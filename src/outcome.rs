@@ -92,7 +92,7 @@ impl Summary {
 }
 
 /// What became of one component.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ComponentOutcome {
     /// Which, from 0.
     pub index: usize,
@@ -101,10 +101,13 @@ pub struct ComponentOutcome {
 }
 
 /// What became of one asset as a whole.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum AssetState {
     /// Every component was built, unless `components` says otherwise.
     Built,
+    /// The outputs of an earlier run are whole, and input, configuration and version are the same.
+    Cached,
     /// Nothing was built for a reason that concerns the whole file.
     Failed(Failure),
     /// Stopped by the user.
@@ -112,7 +115,7 @@ pub enum AssetState {
 }
 
 /// What became of one asset.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AssetOutcome {
     /// Its id.
     pub id: String,
@@ -128,6 +131,9 @@ pub struct AssetOutcome {
     pub input_hash: Option<String>,
     /// What the reader left out.
     pub notes: Vec<String>,
+    /// Most memory that the asset's process held, bytes; absent where the system does not tell, or nothing was computed.
+    #[serde(default)]
+    pub peak_memory: Option<u64>,
 }
 
 impl AssetOutcome {
@@ -142,6 +148,7 @@ impl AssetOutcome {
             files: Vec::new(),
             input_hash: None,
             notes: Vec::new(),
+            peak_memory: None,
         }
     }
 
@@ -155,7 +162,7 @@ impl AssetOutcome {
     pub fn failures(&self) -> impl Iterator<Item = (Option<usize>, &Failure)> {
         let whole = match &self.state {
             AssetState::Failed(failure) => Some((None, failure)),
-            AssetState::Built | AssetState::Cancelled => None,
+            AssetState::Built | AssetState::Cached | AssetState::Cancelled => None,
         };
         let parts = self.components.iter().filter_map(|component| {
             let failure = component.result.as_ref().err()?;
@@ -164,14 +171,15 @@ impl AssetOutcome {
         whole.into_iter().chain(parts)
     }
 
-    /// The word of the output contract: `built`, `failed` (also where only a component failed) or
-    /// `cancelled`.
+    /// The word of the output contract: `built`, `cached`, `failed` (also where only a component failed)
+    /// or `cancelled`.
     #[must_use]
     pub fn state_name(&self) -> &'static str {
         match self.state {
             AssetState::Cancelled => "cancelled",
             AssetState::Built if self.failures().next().is_none() => "built",
-            AssetState::Built | AssetState::Failed(_) => "failed",
+            AssetState::Cached if self.failures().next().is_none() => "cached",
+            AssetState::Built | AssetState::Cached | AssetState::Failed(_) => "failed",
         }
     }
 }

@@ -45,8 +45,11 @@ pub struct Record {
     pub error: Option<String>,
     /// Wall time, seconds.
     pub seconds: f64,
-    /// Peak memory of the process, bytes; absent where the system does not tell.
+    /// Peak memory of the asset's process, bytes; absent where the system does not tell, or nothing was computed.
     pub peak_memory: Option<u64>,
+    /// Name of the machine that did it, where it has one.
+    #[serde(default)]
+    pub host: Option<String>,
     /// Files of the asset, relative to the output root, ascending. After a failure those of the older result, if any.
     pub files: Vec<String>,
     /// One entry a component, in order; empty where the input could not be read.
@@ -86,12 +89,14 @@ impl Record {
             state: match (&outcome.state, failure) {
                 (AssetState::Cancelled, _) => State::Cancelled,
                 (_, Some(_)) => State::Failed,
+                (AssetState::Cached, None) => State::Cached,
                 _ => State::Built,
             },
             kind: failure.map(|f| f.kind),
             error: failure.map(|f| f.message.clone()),
             seconds: outcome.seconds,
-            peak_memory: peak_memory(),
+            peak_memory: outcome.peak_memory,
+            host: None,
             files: outcome
                 .files
                 .iter()
@@ -100,14 +105,6 @@ impl Record {
             components: components.collect(),
         }
     }
-}
-
-/// Most memory that this process has held so far, bytes, where the system tells (Linux).
-fn peak_memory() -> Option<u64> {
-    let status = fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    kibibytes.checked_mul(1024)
 }
 
 /// All records of an output root.
@@ -191,6 +188,7 @@ mod tests {
             error: (state == State::Failed).then(|| "raise the limit".into()),
             seconds: 0.1 + 0.2,
             peak_memory: Some(1 << 30),
+            host: Some("night-1".into()),
             files: vec![format!("{id}/atlas.json")],
             components: vec![ComponentRecord {
                 component: 0,

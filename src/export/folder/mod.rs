@@ -37,6 +37,12 @@ pub fn sweep_stale(output_root: &Path) -> Result<(), ExportError> {
     sweep(output_root, &process_is_gone).map_err(ExportError::io(Action::Read, output_root))
 }
 
+/// Tells that [`sweep_stale`] was done in an output folder lately, so that [`Staging::begin`] leaves it out: a batch
+/// does it once for all its processes.
+pub fn mark_swept(output_root: &Path) {
+    REGISTRY.lock().swept.insert(output_root.to_owned());
+}
+
 /// All live staging folders of a process.
 struct Registry {
     state: Mutex<RegistryState>,
@@ -284,6 +290,19 @@ impl Seek for StagedFile {
     }
 }
 
+/// A name that no other process of any machine gives to a file, while this one runs.
+pub(crate) fn unique_name() -> String {
+    staging_name()
+        .trim_start_matches(unfinished::PREFIX)
+        .trim_end_matches('-')
+        .to_owned()
+}
+
+/// Whether a process of this machine is known to have ended.
+pub(crate) fn process_has_ended(process: u32) -> bool {
+    process_is_gone(process)
+}
+
 /// Replaces a file in one step: a reader sees the old text or the new one. Used for the manifest.
 pub(crate) fn write_file_atomically(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
@@ -297,6 +316,20 @@ pub(crate) fn write_file_atomically(path: &Path, bytes: &[u8]) -> Result<(), Exp
         fs::rename(&temporary, path)?;
         sync_folder(folder)
     })();
+    if written.is_err() {
+        let _ = fs::remove_file(&temporary);
+    }
+    written.map_err(ExportError::io(Action::Write, path))
+}
+
+/// The same without waiting for the disk, for files that say themselves whether they are whole: after a loss of power this one may be
+/// empty or cut.
+pub(crate) fn write_unsynced(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).map_err(ExportError::io(Action::CreateFolder, folder))?;
+    let temporary = folder.join(staging_name());
+    let written = fs::write(&temporary, bytes).and_then(|()| fs::rename(&temporary, path));
     if written.is_err() {
         let _ = fs::remove_file(&temporary);
     }
@@ -326,12 +359,15 @@ pub fn list_files(folder: &Path) -> Result<Vec<String>, ExportError> {
     Ok(files)
 }
 
+/// Names in the output root that are not those of assets.
+pub(crate) const RESERVED: [&str; 4] = ["index.html", "junit.xml", "logs", "manifest.jsonl"];
+
 /// The name, where it is one that a folder can have without meeting our own names.
 fn asset_name(name: &str) -> Result<&str, ExportError> {
     let bad = name.is_empty()
         || name.starts_with('.')
         || name.contains(['/', '\\', '\0'])
-        || name == "manifest.jsonl";
+        || RESERVED.contains(&name);
     if bad {
         return Err(ExportError::AssetName { name: name.into() });
     }
