@@ -1,8 +1,9 @@
 //! What became of an asset: what a job tells the command line and the manifest.
 
+use crate::export::folder::list_files;
 use crate::product::AffineAtlas;
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why an asset or a component was not built (`kind` in the manifest).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -134,6 +135,9 @@ pub struct AssetOutcome {
     /// Most memory that the asset's process held, bytes; absent where the system does not tell, or nothing was computed.
     #[serde(default)]
     pub peak_memory: Option<u64>,
+    /// Whether nothing was built but the result of an earlier run is still in place.
+    #[serde(default)]
+    pub kept: bool,
 }
 
 impl AssetOutcome {
@@ -149,6 +153,7 @@ impl AssetOutcome {
             input_hash: None,
             notes: Vec::new(),
             peak_memory: None,
+            kept: false,
         }
     }
 
@@ -156,6 +161,16 @@ impl AssetOutcome {
     #[must_use]
     pub fn failed(id: &str, failure: Failure, seconds: f64) -> Self {
         Self::whole(id, AssetState::Failed(failure), seconds)
+    }
+
+    /// Looks what is in place of an asset of which nothing was built: what an earlier run left there is kept.
+    pub fn look_for_older(&mut self, output: &Path) {
+        let new = matches!(self.state, AssetState::Built | AssetState::Cached)
+            && (self.components.is_empty() || self.components.iter().any(|c| c.result.is_ok()));
+        if !new {
+            self.files = list_files(&output.join(&self.id)).unwrap_or_default();
+            self.kept = !self.files.is_empty();
+        }
     }
 
     /// Every failure, with its component where it concerns only one.

@@ -188,7 +188,7 @@ fn unknown_key_like_no_other() {
     2 | wallpaper = 2
       : ^^^^^^^^^
       `----
-     help: known here: `run.threads`
+     help: known here: `run.jobs`, `run.threads`, `run.timeout`, `run.memory`, `run.total_memory`
     ");
 }
 

@@ -101,13 +101,12 @@ fn kibibytes(text: &str, key: &str) -> Option<u64> {
     kibibytes.checked_mul(1024)
 }
 
-/// Memory that a process needs whatever it builds: measured with a tetrahedron.
-const BASE: u64 = 48 << 20;
-/// Per byte of input. Text formats take about 70 bytes a vertex with its two faces, binary ones half of it; the flow, the
-/// overlay and its charts take a few kilobytes a vertex.
-const PER_BYTE: u64 = 60;
-/// Per texel: the channels of an image, its compressed copy and the mesh that is rebuilt to measure it.
-const PER_TEXEL: u64 = 200;
+/// Memory that a process needs whatever it builds: 8 MiB for a file that is refused, 18 MiB for a small mesh with small images.
+const BASE: u64 = 16 << 20;
+/// Per byte of input: 60 for 2.4 MB of OBJ; binary formats hold the same in fewer.
+const PER_BYTE: u64 = 100;
+/// Per texel: 340 for the default budget, of channels, their compressed copy and the mesh that is rebuilt to measure them.
+const PER_TEXEL: u64 = 350;
 
 /// Most memory that building an asset is expected to take, bytes: a rule of thumb by which jobs are held back, not a limit.
 #[must_use]

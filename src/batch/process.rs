@@ -7,7 +7,6 @@
 use super::limits;
 use super::task::Task;
 use super::worker::{Event, Job, Voice};
-use crate::export::folder::list_files;
 use crate::outcome::{AssetOutcome, AssetState, Failure, FailureKind};
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::Path;
@@ -226,7 +225,7 @@ impl Process {
             None => AssetState::Failed(self.crashed(status.ok())),
         };
         let mut outcome = AssetOutcome::whole(&self.id, state, seconds);
-        outcome.files = list_files(&output.join(&self.id)).unwrap_or_default();
+        outcome.look_for_older(output);
         (outcome, false)
     }
 

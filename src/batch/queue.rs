@@ -82,23 +82,26 @@ pub fn decide(batch: &Batch<'_>, tasks: &[Task], known: &Manifest) -> Vec<Verdic
 /// program ends.
 ///
 /// # Errors
-/// Where the manifest cannot be written; the outcomes are there all the same.
+/// Where the output root cannot be written, then nothing was done; or the manifest cannot, then outcomes are there all the same.
 pub fn run(
     batch: &Batch<'_>,
     tasks: &[Task],
     watcher: &dyn Watcher,
 ) -> (Vec<AssetOutcome>, Result<(), ExportError>) {
-    let (mut recorder, mut trouble) = match Recorder::begin(batch.output) {
-        Ok(recorder) => (Some(recorder), None),
-        Err(error) => (None, Some(error)),
+    let mut recorder = match Recorder::begin(batch.output) {
+        Ok(recorder) => recorder,
+        // Where this cannot be written no atlas can: thousands of them need not be computed to find out.
+        Err(error) => return (Vec::new(), Err(error)),
     };
     if let Err(error) = sweep_stale(batch.output) {
         tracing::debug!(%error, "nothing to clear up");
     }
+    // Nothing to clear up is no trouble.
+    let _ = sweep_stale(&super::private_folder(batch.output).join("cache"));
     mark_swept(batch.output);
     let _ = std::fs::create_dir_all(batch.output.join("logs"));
-    let known = recorder.as_ref().and_then(|r| r.known().ok());
-    let verdicts = decide(batch, tasks, &known.unwrap_or_default());
+    // Reasons are of no interest here, so the manifest need not be read.
+    let verdicts = decide(batch, tasks, &Manifest::default());
     let (sender, receiver) = channel();
     let mut queue = Queue {
         batch,
@@ -114,7 +117,7 @@ pub fn run(
     let mut to_build = Vec::new();
     for (number, verdict) in verdicts.into_iter().enumerate() {
         match verdict {
-            Verdict::Cached(outcome) => queue.done(number, *outcome, recorder.as_mut()),
+            Verdict::Cached(outcome) => queue.done(number, *outcome, &mut recorder),
             Verdict::Build(_) => to_build.push(number),
         }
     }
@@ -130,15 +133,12 @@ pub fn run(
         bytes => bytes,
     };
     queue.waiting = to_build.into();
-    queue.work(&receiver, recorder.as_mut());
+    queue.work(&receiver, &mut recorder);
     let missing = |task: &Task| AssetOutcome::whole(&task.id, AssetState::Cancelled, 0.0);
     let outcomes = queue.outcomes.into_iter().zip(tasks);
     let outcomes = outcomes.map(|(outcome, task)| outcome.unwrap_or_else(|| missing(task)));
     let outcomes = outcomes.collect();
-    if let Some(recorder) = recorder {
-        trouble = recorder.finish().err();
-    }
-    (outcomes, trouble.map_or(Ok(()), Err))
+    (outcomes, recorder.finish())
 }
 
 struct Queue<'a> {
@@ -154,7 +154,7 @@ struct Queue<'a> {
 }
 
 impl Queue<'_> {
-    fn work(&mut self, receiver: &Receiver<Message>, mut recorder: Option<&mut Recorder>) {
+    fn work(&mut self, receiver: &Receiver<Message>, recorder: &mut Recorder) {
         let mut stopping: Option<Instant> = None;
         loop {
             if stopping.is_none() && self.watcher.cancelled() {
@@ -165,12 +165,12 @@ impl Queue<'_> {
                 while let Some(number) = self.waiting.pop_front() {
                     let mut outcome =
                         AssetOutcome::whole(&self.tasks[number].id, AssetState::Cancelled, 0.0);
-                    outcome.files = older_files(self.batch.output, &outcome.id);
-                    self.done(number, outcome, recorder.as_deref_mut());
+                    outcome.look_for_older(self.batch.output);
+                    self.done(number, outcome, recorder);
                 }
             }
             while self.may_start() {
-                self.start_next(recorder.as_deref_mut());
+                self.start_next(recorder);
             }
             if self.running.is_empty() && self.waiting.is_empty() {
                 return;
@@ -191,7 +191,7 @@ impl Queue<'_> {
                 Ok(Message::Closed(number)) => {
                     let last = self.running.get_mut(&number).is_some_and(Process::closed);
                     if last && let Some(process) = self.running.remove(&number) {
-                        self.conclude(number, process, recorder.as_deref_mut());
+                        self.conclude(number, process, recorder);
                     }
                 }
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {}
@@ -225,7 +225,7 @@ impl Queue<'_> {
             && taken.saturating_add(self.tasks[next].memory()) <= self.budget
     }
 
-    fn start_next(&mut self, recorder: Option<&mut Recorder>) {
+    fn start_next(&mut self, recorder: &mut Recorder) {
         let Some(number) = self.waiting.pop_front() else {
             return;
         };
@@ -261,13 +261,13 @@ impl Queue<'_> {
                     ),
                 };
                 let mut outcome = AssetOutcome::failed(&task.id, failure, 0.0);
-                outcome.files = older_files(self.batch.output, &task.id);
+                outcome.look_for_older(self.batch.output);
                 self.done(number, outcome, recorder);
             }
         }
     }
 
-    fn conclude(&mut self, number: usize, process: Process, recorder: Option<&mut Recorder>) {
+    fn conclude(&mut self, number: usize, process: Process, recorder: &mut Recorder) {
         let worker = process.number();
         let (outcome, in_order) = process.conclude(self.batch.output);
         WORKERS
@@ -302,20 +302,14 @@ impl Queue<'_> {
         let _ = file.and_then(|mut file| file.write_all(format!("{line}\n").as_bytes()));
     }
 
-    fn done(&mut self, number: usize, mut outcome: AssetOutcome, recorder: Option<&mut Recorder>) {
+    fn done(&mut self, number: usize, mut outcome: AssetOutcome, recorder: &mut Recorder) {
         let task = &self.tasks[number];
-        if let Some(recorder) = recorder {
-            recorder.record(Record::of(&outcome, &task.config_hash));
-        }
+        recorder.record(Record::of(&outcome, &task.config_hash));
         self.watcher.finished(number, &outcome);
         // They are written down; thousands of assets would fill memory with them.
         outcome.files = Vec::new();
         self.outcomes[number] = Some(outcome);
     }
-}
-
-fn older_files(output: &Path, id: &str) -> Vec<String> {
-    crate::export::folder::list_files(&output.join(id)).unwrap_or_default()
 }
 
 /// Process numbers of all workers that run.

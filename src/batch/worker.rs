@@ -118,6 +118,7 @@ pub fn work(job: &Job, path: &Path, output: &Path) -> AssetOutcome {
     let told = Told::new(job);
     let mut outcome = job::run(path, &job.given, output, &job.id, &config, &told);
     told.leave();
+    outcome.look_for_older(output);
     outcome.peak_memory = limits::peak_memory();
     let after = read::fingerprint(path).ok();
     match (before, after) {

@@ -43,30 +43,36 @@ pub fn run(build: &Build, global: &Global, work: &Work) -> Result<u8, Problem> {
     let progress = Progress::new(global, tasks.len());
     let (outcomes, recorded) = (work.batch)(&batch, &tasks, &progress);
     progress.finish();
+    let recorded = recorded.map_err(|failure| Problem::NotRecorded {
+        path: plan.output.join("manifest.jsonl"),
+        reason: failure.message,
+    });
+    if outcomes.is_empty() {
+        recorded?;
+        return Ok(exit::NOTHING_TO_DO);
+    }
     if !global.quiet {
-        terminal::print(&summary::table(&outcomes, terminal::stdout_width()));
+        terminal::print(&summary::results(&outcomes, terminal::stdout_width()));
     }
     if global.log_format == LogFormat::Text {
         terminal::print_error(&summary::failures(&outcomes));
     }
-    recorded.map_err(|failure| Problem::NotRecorded {
-        path: plan.output.join("manifest.jsonl"),
-        reason: failure.message,
-    })?;
+    recorded?;
     write_records(build, &plan, &tasks, &outcomes)?;
     Ok(exit_code(&outcomes))
 }
 
 /// This program itself, also where its file has been replaced since it was started.
 fn program() -> Result<PathBuf, Problem> {
-    let itself = Path::new("/proc/self/exe");
-    match itself.exists() {
-        true => Ok(itself.to_owned()),
-        false => std::env::current_exe().map_err(|error| {
-            Problem::Internal(format!(
-                "internal error: this program cannot find itself: {error}"
-            ))
-        }),
+    let file = std::env::current_exe();
+    let running = Path::new("/proc/self/exe");
+    match file {
+        // Linux names a file that is gone by a path that does not exist.
+        Ok(file) if file.exists() => Ok(file),
+        _ if running.exists() => Ok(running.to_owned()),
+        file => Err(Problem::Internal(format!(
+            "internal error: this program cannot find itself: {file:?}"
+        ))),
     }
 }
 
@@ -115,7 +121,13 @@ fn write_records(
     tasks: &[Task],
     outcomes: &[AssetOutcome],
 ) -> Result<(), Problem> {
-    check::write_whole(&plan.output.join("junit.xml"), junit(outcomes).as_bytes())?;
+    let junit_xml = plan.output.join("junit.xml");
+    check::write_whole(&junit_xml, junit(outcomes).as_bytes()).map_err(
+        |problem| match problem {
+            Problem::NotWritten { path, reason } => Problem::NotRecorded { path, reason },
+            other => other,
+        },
+    )?;
     if let Some(path) = &build.depfile {
         let files = tasks.iter().flat_map(|task| &task.files);
         let files = files.chain(&plan.files).map(PathBuf::as_path);

@@ -51,6 +51,12 @@ struct Running {
 }
 
 impl Running {
+    /// Its number in the order of building, from 0; what is cached comes before all.
+    fn index(&self, task: usize) -> usize {
+        let place = self.places.get(&task).copied().unwrap_or(0);
+        self.ids.len() - self.places.len() + place
+    }
+
     /// Seconds that are left if the rest goes as fast as what is done; none before a hundredth is done.
     fn left(&self) -> Option<f64> {
         let part = self.cost_done / self.cost;
@@ -119,7 +125,7 @@ impl Progress {
         self.show_done(outcome, index + 1, "");
     }
 
-    /// The asset is the `count`th that is done; `more` ends its line.
+    /// `count` is the asset's number in lines, and how many are done in bars; `more` ends its line.
     fn show_done(&self, outcome: &AssetOutcome, count: usize, more: &str) {
         match &self.style {
             Style::Silent => {}
@@ -359,15 +365,20 @@ impl Watcher for Progress {
             true => running.left().map(in_words),
             false => None,
         };
-        match (&self.style, left) {
-            (Style::Bars { all, .. }, Some(left)) => all.set_message(format!("about {left} left")),
-            (Style::Lines { .. }, Some(left)) if self.assets > 10 => {
-                self.show_done(outcome, running.done, &format!(", about {left} left"));
-                return;
+        let more = match &left {
+            Some(left) if self.assets > 10 => {
+                format!(", {} left: about {left}", self.assets - running.done)
             }
-            _ => {}
+            _ => String::new(),
+        };
+        if let (Style::Bars { all, .. }, Some(left)) = (&self.style, &left) {
+            all.set_message(format!("about {left} left"));
         }
-        self.show_done(outcome, running.done, "");
+        let count = match &self.style {
+            Style::Lines { .. } => running.index(task) + 1,
+            _ => running.done,
+        };
+        self.show_done(outcome, count, &more);
     }
 
     fn cancelled(&self) -> bool {

@@ -39,8 +39,7 @@ pub fn run(arguments: &Worker, work: &Work) -> ExitCode {
     };
     let outcome = outcome.unwrap_or_else(|failure| {
         let mut outcome = AssetOutcome::failed(&job.id, failure, start.elapsed().as_secs_f64());
-        let folder = arguments.output.join(&job.id);
-        outcome.files = affine_atlas::export::folder::list_files(&folder).unwrap_or_default();
+        outcome.look_for_older(&arguments.output);
         outcome
     });
     log_end(&outcome);

@@ -52,6 +52,9 @@ pub struct Record {
     pub host: Option<String>,
     /// Files of the asset, relative to the output root, ascending. After a failure those of the older result, if any.
     pub files: Vec<String>,
+    /// Whether nothing was built and `files` are those of an earlier run.
+    #[serde(default)]
+    pub kept: bool,
     /// One entry a component, in order; empty where the input could not be read.
     pub components: Vec<ComponentRecord>,
 }
@@ -102,6 +105,7 @@ impl Record {
                 .iter()
                 .map(|file| format!("{}/{file}", outcome.id))
                 .collect(),
+            kept: outcome.kept,
             components: components.collect(),
         }
     }
@@ -190,6 +194,7 @@ mod tests {
             peak_memory: Some(1 << 30),
             host: Some("night-1".into()),
             files: vec![format!("{id}/atlas.json")],
+            kept: state == State::Failed,
             components: vec![ComponentRecord {
                 component: 0,
                 state,

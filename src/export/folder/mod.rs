@@ -18,7 +18,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Component, Path, PathBuf};
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
-use unfinished::{process_is_gone, remove_folder, replace, staging_name, sweep};
+use unfinished::{process_is_gone, remove_folder, replace, staging_name, sweep, unfinished_name};
 
 /// The folder of one component of an asset that has several.
 pub fn component_name(component: usize) -> String {
@@ -292,9 +292,9 @@ impl Seek for StagedFile {
 
 /// A name that no other process of any machine gives to a file, while this one runs.
 pub(crate) fn unique_name() -> String {
-    staging_name()
+    unfinished_name("", "")
         .trim_start_matches(unfinished::PREFIX)
-        .trim_end_matches('-')
+        .trim_matches('-')
         .to_owned()
 }
 

@@ -50,7 +50,7 @@ pub(super) fn staging_name() -> String {
 }
 
 /// A hidden name that nothing else has: kind, machine, process and number, and which folder was set aside.
-fn unfinished_name(kind: &str, asset: &str) -> String {
+pub(super) fn unfinished_name(kind: &str, asset: &str) -> String {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let number = COUNT.fetch_add(1, Ordering::Relaxed);
     let process = std::process::id();
