@@ -823,3 +823,82 @@ fn a_survey_keeps_what_is_not_its_own() {
     help: choose another folder with `--out`
     ");
 }
+
+/// A folder with two tetrahedra in folders of their own, and a configuration that finds them.
+fn two_sets(keys: &str) -> tempfile::TempDir {
+    let folder = folder();
+    for set in ["left", "right"] {
+        std::fs::create_dir_all(folder.path().join("meshes").join(set)).expect("made");
+        let path = folder.path().join("meshes").join(set).join("t.obj");
+        std::fs::write(path, TETRAHEDRON).expect("written");
+    }
+    let text = format!(
+        "[input]\npaths = [\"meshes\"]\n[cones]\nstrategy = \"spread\"\ncount = 4\n[patches]\ntexel_budget = 4096\n[pictures]\nenabled = false\n{keys}"
+    );
+    std::fs::write(folder.path().join("config.toml"), text).expect("written");
+    folder
+}
+
+#[test]
+fn inputs_that_name_nothing() {
+    let folder = two_sets("");
+    insta::assert_snapshot!(refusal(folder.path(), &["build", "*.ply"], 3), @"");
+    insta::assert_snapshot!(refusal(folder.path(), &["build", "@tonight.txt"], 2), @"");
+    insta::assert_snapshot!(refusal(folder.path(), &["build", "meshes/[a"], 2), @"");
+}
+
+#[test]
+fn tables_for_some_meshes_that_are_wrong() {
+    let refused = |keys: &str| refusal(two_sets(keys).path(), &["build"], 2);
+    insta::assert_snapshot!(refused("[[asset]]\nglob = \"*\"\nflow.shceme = \"thurston\"\n"), @"");
+    insta::assert_snapshot!(refused("[[asset]]\nflow.scheme = \"thurston\"\n"), @"");
+    insta::assert_snapshot!(refused("[[asset]]\nglob = \"*\"\nrun.jobs = 2\n"), @"");
+}
+
+/// What a dry run says before and after a build, and that it builds nothing.
+#[test]
+fn a_dry_run_says_why() {
+    let folder = two_sets(
+        "[[asset]]\nglob = \"meshes/left/*\"\npatches.padding = 3\n[[asset]]\npath = \"none.obj\"\n",
+    );
+    let dry = |arguments: &[&str]| {
+        let output = run(
+            folder.path(),
+            &[&["build", "--dry-run"], arguments].concat(),
+        );
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        (stdout(&output), stderr(&output))
+    };
+    let (said, warned) = dry(&[]);
+    insta::assert_snapshot!(said, @"");
+    insta::assert_snapshot!(warned.trim_start(), @"");
+    assert!(!folder.path().join("affine-atlas-out").exists());
+    let output = run(folder.path(), &["build", "--quiet"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    insta::assert_snapshot!(dry(&[]).0, @"");
+    insta::assert_snapshot!(dry(&["--set", "patches.padding=3"]).0, @"");
+    insta::assert_snapshot!(dry(&["--force"]).0, @"");
+    std::fs::write(folder.path().join("meshes/right/t.obj"), "v 0 0 0").expect("written");
+    std::fs::remove_file(folder.path().join("affine-atlas-out/left-t/atlas.npz")).expect("there");
+    insta::assert_snapshot!(dry(&[]).0, @"");
+    // The mesh that is refused now keeps its older folder, and says so.
+    let output = run(folder.path(), &["build", "--quiet"]);
+    assert_eq!(output.status.code(), Some(1));
+    insta::assert_snapshot!(stderr(&output).lines().last().unwrap_or_default(), @"");
+    assert!(
+        folder
+            .path()
+            .join("affine-atlas-out/right-t/atlas.json")
+            .exists()
+    );
+}
+
+#[test]
+fn the_worker_is_for_builds_alone() {
+    let folder = folder();
+    let output = run(folder.path(), &["worker", "a.obj", "out"]);
+    assert_eq!(output.status.code(), Some(2));
+    insta::assert_snapshot!(stderr(&output), @"");
+    let help = stdout(&run(folder.path(), &["--help"]));
+    assert!(!help.contains("worker"), "{help}");
+}

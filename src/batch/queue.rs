@@ -26,6 +26,8 @@ use std::time::{Duration, Instant};
 
 /// How often a request to stop is looked for.
 const GLANCE: Duration = Duration::from_millis(50);
+/// Assets that are looked at together.
+const PART: usize = 128;
 /// Time that workers get to clear up when the run is stopped.
 const PATIENCE: Duration = Duration::from_secs(4);
 
@@ -100,8 +102,6 @@ pub fn run(
     let _ = sweep_stale(&super::private_folder(batch.output).join("cache"));
     mark_swept(batch.output);
     let _ = std::fs::create_dir_all(batch.output.join("logs"));
-    // Reasons are of no interest here, so the manifest need not be read.
-    let verdicts = decide(batch, tasks, &Manifest::default());
     let (sender, receiver) = channel();
     let mut queue = Queue {
         batch,
@@ -115,10 +115,15 @@ pub fn run(
         budget: 0,
     };
     let mut to_build = Vec::new();
-    for (number, verdict) in verdicts.into_iter().enumerate() {
-        match verdict {
-            Verdict::Cached(outcome) => queue.done(number, *outcome, &mut recorder),
-            Verdict::Build(_) => to_build.push(number),
+    // In parts, so that what is known of thousands of assets is never in memory at once. Reasons are of no interest here, so the manifest need
+    // not be read.
+    for (part, some) in tasks.chunks(PART).enumerate() {
+        let verdicts = decide(batch, some, &Manifest::default());
+        for (number, verdict) in (part * PART..).zip(verdicts) {
+            match verdict {
+                Verdict::Cached(outcome) => queue.done(number, *outcome, &mut recorder),
+                Verdict::Build(_) => to_build.push(number),
+            }
         }
     }
     to_build.sort_by_key(|&number| (std::cmp::Reverse(tasks[number].cost), number));

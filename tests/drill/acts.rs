@@ -104,11 +104,11 @@ pub fn ctrl_c() -> Found {
 pub fn an_asset_runs_out_of_memory() -> Found {
     let mut stage = Stage::new();
     let config = fs::read_to_string(stage.folder().join("config.toml"))?;
-    stage.configure("[[asset]]\nglob = \"a0003.*\"\nrun.memory = 6000000\n");
+    stage.configure("[[asset]]\nglob = \"a0005.*\"\nrun.memory = 6000000\n");
     let (code, said) = Run::start(stage.command()).end();
     assert_eq!(code, Some(1), "{said}");
-    assert_eq!(stage.in_state("failed"), ["set-0-a0003"]);
-    let record = &stage.manifest()["set-0-a0003"];
+    assert_eq!(stage.in_state("failed"), ["set-0-a0005"]);
+    let record = &stage.manifest()["set-0-a0005"];
     assert_eq!(
         (&record["kind"], &record["kept"]),
         (&"memory".into(), &true.into()),
@@ -118,7 +118,7 @@ pub fn an_asset_runs_out_of_memory() -> Found {
     stage.nothing_is_lost();
     fs::write(stage.folder().join("config.toml"), config)?;
     stage.completes();
-    assert_eq!(stage.in_state("built"), ["set-0-a0003"]);
+    assert_eq!(stage.in_state("built"), ["set-0-a0005"]);
     Ok(None)
 }
 
@@ -179,26 +179,26 @@ pub fn the_cache_is_corrupted() -> Found {
         Ok(fs::write(path, bytes)?)
     };
     flip(".affine-atlas/cache/set-0-a0000.json", 200)?;
-    flip("set-0-a0001/images/0000.exr", 900)?;
-    fs::remove_file(stage.out.join("set-0-a0002/atlas.npz"))?;
-    fs::write(stage.out.join(".affine-atlas/cache/set-0-a0003.json"), "")?;
-    fs::remove_dir_all(stage.out.join("set-0-a0004"))?;
+    flip("set-0-a0002/images/0000.exr", 900)?;
+    fs::remove_file(stage.out.join("set-0-a0003/atlas.npz"))?;
+    fs::write(stage.out.join(".affine-atlas/cache/set-0-a0005.json"), "")?;
+    fs::remove_dir_all(stage.out.join("set-0-a0006"))?;
     let dry = stage.command().arg("--dry-run").output()?;
     let reasons = String::from_utf8_lossy(&dry.stdout);
     assert_eq!(dry.status.code(), Some(0), "{reasons}");
     for reason in [
         "set-0-a0000  cache entry damaged",
-        "set-0-a0001  outputs damaged: images/0000.exr",
-        "set-0-a0002  outputs missing: atlas.npz",
-        "set-0-a0003  cache entry damaged",
-        "set-0-a0004  outputs missing: ",
+        "set-0-a0002  outputs damaged: images/0000.exr",
+        "set-0-a0003  outputs missing: atlas.npz",
+        "set-0-a0005  cache entry damaged",
+        "set-0-a0006  outputs missing: ",
         "5 of 60 would be built",
     ] {
         assert!(reasons.contains(reason), "{reason}: {reasons}");
     }
     // Damage that the watcher must not blame on the program is mended first.
     stage.completes();
-    let expected: Vec<String> = (0..5).map(|i| format!("set-0-a000{i}")).collect();
+    let expected = [0, 2, 3, 5, 6].map(|i| format!("set-0-a000{i}"));
     assert_eq!(stage.in_state("built"), expected);
     Ok(None)
 }
@@ -213,8 +213,8 @@ pub fn two_batches_share_a_root() -> Found {
     };
     // Ids are those of the whole folder: its place below `meshes` is in both globs.
     let runs = [
-        half("\"meshes/*/a00[012]*\""),
-        half("\"meshes/*/a00[3456789]*\""),
+        half("\"meshes/*/*[02468].*\""),
+        half("\"meshes/*/*[13579].*\""),
     ];
     for run in runs {
         let (code, said) = run.end();

@@ -93,14 +93,6 @@ impl Recorder {
         Ok(())
     }
 
-    /// What the manifest holds now.
-    ///
-    /// # Errors
-    /// Where it cannot be read.
-    pub fn known(&self) -> Result<Manifest, ExportError> {
-        Ok(Manifest::load(&self.output)?.0)
-    }
-
     /// Writes down one outcome.
     pub fn record(&mut self, mut record: Record) {
         record.host.clone_from(&self.host);
@@ -133,11 +125,7 @@ impl Recorder {
             .open(&path);
         let guard = guard.map_err(ExportError::io(Action::Write, &path))?;
         lock(&guard, true);
-        let mut manifest = self.known()?;
-        for record in self.unsaved.values() {
-            manifest.insert(record.clone());
-        }
-        manifest.save(&self.output)?;
+        Manifest::update(&self.output, &self.unsaved)?;
         drop(guard);
         self.unsaved.clear();
         if let Some((file, _)) = &mut self.journal {

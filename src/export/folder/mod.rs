@@ -305,14 +305,23 @@ pub(crate) fn process_has_ended(process: u32) -> bool {
 
 /// Replaces a file in one step: a reader sees the old text or the new one. Used for the manifest.
 pub(crate) fn write_file_atomically(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
+    stream_file_atomically(path, |out| out.write_all(bytes))
+}
+
+/// The same for what is written bit by bit.
+pub(crate) fn stream_file_atomically(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), ExportError> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
     fs::create_dir_all(folder).map_err(ExportError::io(Action::CreateFolder, folder))?;
     let temporary = folder.join(staging_name());
     let written = (|| {
-        let mut file = File::create(&temporary)?;
-        file.write_all(bytes)?;
-        file.sync_all()?;
+        let mut file = BufWriter::new(File::create(&temporary)?);
+        write(&mut file)?;
+        file.flush()?;
+        file.get_ref().sync_all()?;
         fs::rename(&temporary, path)?;
         sync_folder(folder)
     })();
