@@ -33,6 +33,9 @@ pub mod records;
 pub mod task;
 pub mod worker;
 
+#[cfg(test)]
+mod tests;
+
 pub use queue::{Batch, Watcher, run};
 pub use task::{Settings, Task};
 

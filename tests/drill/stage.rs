@@ -198,6 +198,11 @@ impl Stage {
                 "{id}: {record}"
             );
         }
+        self.look_away();
+    }
+
+    /// Nothing half written was seen so far; from here on nobody looks.
+    pub fn look_away(&mut self) {
         if let Some(watcher) = self.watcher.take() {
             watcher.stop();
         }
