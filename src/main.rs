@@ -20,8 +20,8 @@ use affine_atlas::outcome::{AssetOutcome, Failure, FailureKind};
 use affine_atlas::read::{self, ReadParams};
 use affine_atlas::verify::{self, SourceSurface, VerifyOptions};
 use cli::work::{
-    FitRequest, FitResult, Inspection, RebuildRequest, RebuildResult, SurveyRequest, Surveyed,
-    TextureRequest, TextureResult, VerifyRequest, VerifyResult, Work,
+    FitRequest, FitResult, Inspection, RebuildRequest, RebuildResult, Recorded, SurveyRequest,
+    Surveyed, TextureRequest, TextureResult, VerifyRequest, VerifyResult, Work,
 };
 use std::process::ExitCode;
 
@@ -44,11 +44,7 @@ fn main() -> ExitCode {
     cli::main(&WORK)
 }
 
-fn batch(
-    batch: &Batch<'_>,
-    tasks: &[Task],
-    watcher: &dyn Watcher,
-) -> (Vec<AssetOutcome>, Result<(), Failure>) {
+fn batch(batch: &Batch<'_>, tasks: &[Task], watcher: &dyn Watcher) -> Recorded {
     let (outcomes, recorded) = batch::run(batch, tasks, watcher);
     let recorded = recorded.map_err(|error| Failure::from(&BuildError::Export(error)));
     (outcomes, recorded)

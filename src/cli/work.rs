@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// Functions of the library that the commands call. Tests put their own in.
 pub struct Work {
     /// Builds what is not whole, each asset in a process of its own, and writes down what became of it.
-    pub batch: fn(&Batch<'_>, &[Task], &dyn Watcher) -> (Vec<AssetOutcome>, Result<(), Failure>),
+    pub batch: fn(&Batch<'_>, &[Task], &dyn Watcher) -> Recorded,
     /// Says what a batch would build.
     pub decide: fn(&Batch<'_>, &[Task]) -> Vec<Verdict>,
     /// Does a worker's job: input, output root.
@@ -36,6 +36,9 @@ pub struct Work {
     /// Removes folders that are being written. Called once before the program is stopped.
     pub remove_staging: fn(),
 }
+
+/// What became of every asset, and whether that could be written down.
+pub type Recorded = (Vec<AssetOutcome>, Result<(), Failure>);
 
 /// What `check` says of one asset.
 pub struct Inspection {

@@ -43,16 +43,21 @@ const LONGEST: usize = 120;
 /// numbered in the order given. Ids depend on the list of paths only.
 #[must_use]
 pub fn name_assets(inputs: Vec<Input>) -> Vec<Asset> {
-    let mut spellings: Vec<[String; 4]> = inputs.iter().map(spellings).collect();
     let mut groups: BTreeMap<String, Vec<usize>> = BTreeMap::new();
-    for (i, [first, ..]) in spellings.iter().enumerate() {
-        groups.entry(first.to_lowercase()).or_default().push(i);
+    let mut longer_and_longer = Vec::with_capacity(inputs.len());
+    for (i, input) in inputs.iter().enumerate() {
+        let spellings = spellings(input);
+        groups
+            .entry(spellings[0].to_lowercase())
+            .or_default()
+            .push(i);
+        longer_and_longer.push(spellings.into_iter());
     }
     let mut ids = vec![String::new(); inputs.len()];
     for members in groups.values() {
-        for k in 0..4 {
+        for _ in 0..4 {
             for &i in members {
-                ids[i] = std::mem::take(&mut spellings[i][k]);
+                ids[i] = longer_and_longer[i].next().unwrap_or_default();
             }
             if all_distinct(members.iter().map(|&i| ids[i].as_str())) {
                 break;

@@ -13,6 +13,7 @@
 mod generate;
 
 mod acts;
+mod depfiles;
 mod disks;
 mod folders;
 mod night;
@@ -28,7 +29,7 @@ fn main() -> ExitCode {
     let mut arguments = Arguments::from_args();
     // Each act keeps all cores busy by itself.
     arguments.test_threads = Some(1);
-    let acts: [(&str, Act); 12] = [
+    let acts: [(&str, Act); 14] = [
         ("a_worker_is_killed", acts::a_worker_is_killed),
         ("the_batch_is_killed", acts::the_batch_is_killed),
         ("ctrl_c", acts::ctrl_c),
@@ -49,17 +50,22 @@ fn main() -> ExitCode {
             "an_asset_s_place_is_taken",
             disks::an_asset_s_place_is_taken,
         ),
+        ("ninja_reads_the_depfile", depfiles::ninja),
+        ("make_reads_the_depfile", depfiles::make),
         ("a_night_of_100", || night::night(100, None)),
     ];
     let mut trials: Vec<Trial> = acts
         .into_iter()
-        .map(|(name, act)| match disks::impossible(name) {
-            Some(why) => {
-                eprintln!("{name} cannot be tried here: {why}");
-                Trial::test(name, || Ok(())).with_ignored_flag(true)
-            }
-            None => Trial::test(name, move || act().map(report)),
-        })
+        .map(
+            |(name, act)| match disks::impossible(name).or_else(|| depfiles::impossible(name)) {
+                Some(why) => {
+                    eprintln!("{name} cannot be tried here: {why}");
+                    let refuse = move || Err(format!("cannot be tried here: {why}").into());
+                    Trial::test(name, refuse).with_ignored_flag(true)
+                }
+                None => Trial::test(name, move || act().map(report)),
+            },
+        )
         .collect();
     let long: [(&str, Act); 2] = [
         ("a_night_of_2000", || night::night(2000, Some(50.0))),
@@ -68,7 +74,9 @@ fn main() -> ExitCode {
     for (name, act) in long {
         trials.push(Trial::test(name, move || act().map(report)).with_ignored_flag(true));
     }
-    libtest_mimic::run(&arguments, trials).exit_code()
+    let conclusion = libtest_mimic::run(&arguments, trials);
+    stage::clear_up();
+    conclusion.exit_code()
 }
 
 fn report(found: Option<String>) {

@@ -29,6 +29,7 @@ struct Reference {
 }
 
 static REFERENCE: LazyLock<Reference> = LazyLock::new(|| {
+    BEGUN.store(true, Ordering::Relaxed);
     let folder = tempfile::tempdir().expect("a temporary folder");
     let meshes = folder.path().join("meshes");
     // Only good ones: what goes wrong comes from outside.
@@ -82,6 +83,15 @@ fn program(folder: &Path) -> Command {
         .env_remove("RUST_BACKTRACE");
     command
 }
+
+/// Removes what all acts share, which nobody owns.
+pub fn clear_up() {
+    if BEGUN.load(Ordering::Relaxed) {
+        let _ = fs::remove_dir_all(REFERENCE.folder.path());
+    }
+}
+
+static BEGUN: AtomicBool = AtomicBool::new(false);
 
 /// One act: an output root with last night's atlases, and tonight's settings.
 pub struct Stage {
