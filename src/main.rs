@@ -16,7 +16,7 @@ use affine_atlas::job::rebuild::RebuildAssetError;
 use affine_atlas::job::survey::folder_name as survey_folder;
 use affine_atlas::job::{self, BuildError};
 use affine_atlas::observe::Observer;
-use affine_atlas::outcome::{AssetOutcome, Failure, FailureKind};
+use affine_atlas::outcome::{Failure, FailureKind};
 use affine_atlas::read::{self, ReadParams};
 use affine_atlas::verify::{self, SourceSurface, VerifyOptions};
 use cli::work::{
