@@ -116,8 +116,9 @@ pub fn the_root_cannot_be_written() -> Found {
 pub fn an_asset_s_place_is_taken() -> Found {
     let mut stage = Stage::new();
     let places: [PathBuf; 2] = ["set-0-a0005", "set-0-a0006"].map(|id| stage.out.join(id));
-    for place in &places {
-        fs::remove_dir_all(place)?;
+    for (i, place) in places.iter().enumerate() {
+        // In one step: the watcher must not see it half removed.
+        fs::rename(place, stage.folder().join(format!("aside-{i}")))?;
     }
     fs::write(&places[0], "mine")?;
     let (code, said) = Run::start(stage.command()).end();
