@@ -16,7 +16,8 @@
 //! stand in order. Dependencies point one way: `geometry` ← `flow` ← `atlas` ← `product` ← `report`,
 //! `export`; `read` and `repair` know `geometry` only; [`rebuild`] makes a mesh again from images and seams alone, in memory for
 //! `report` and from a folder for the command; [`fit`] makes spline surfaces of the images of rectangles; [`texture`] lays an image that repeats over the surface; [`verify`] reads what was written and shares no
-//! code with the stages that made it (but the readers of file formats in `read`).
+//! code with the stages that made it (but the readers of file formats in `read`). [`batch`] runs [`job`] for many assets, each in a
+//! process of its own, and knows nothing of what a job computes.
 //!
 //! ```
 //! use affine_atlas::{build, config::Config, geometry::mesh::Soup};
@@ -64,6 +65,7 @@
 //! * P. Sander, Z. Wood, S. Gortler, J. Snyder, H. Hoppe. *Multi-chart geometry images.* SGP 2003.
 
 pub mod atlas;
+pub mod batch;
 pub mod config;
 pub mod export;
 pub mod fit;

@@ -1,34 +1,37 @@
-//! The `affine-atlas` command: arguments → configuration → one job an asset → exit code.
+//! The `affine-atlas` command: arguments → configuration → one worker process an asset → exit code.
 //!
 //! Everything that computes lives in the library; [`cli`] only reads arguments, shows progress
 //! and words results. What the command asks of the library stands in [`WORK`].
 
 mod cli;
 
+use affine_atlas::batch::cache::Verdict;
+use affine_atlas::batch::{self, Batch, Task, Watcher};
 use affine_atlas::config::Config;
 use affine_atlas::config::assets::Asset;
 use affine_atlas::export::folder::remove_all_staging;
 use affine_atlas::export::index;
-use affine_atlas::export::manifest::{Manifest, Record};
+use affine_atlas::export::manifest::Manifest;
 use affine_atlas::job::fit::FitParams;
 use affine_atlas::job::rebuild::RebuildAssetError;
 use affine_atlas::job::survey::folder_name as survey_folder;
 use affine_atlas::job::{self, BuildError};
 use affine_atlas::observe::Observer;
-use affine_atlas::outcome::{AssetOutcome, Failure, FailureKind};
+use affine_atlas::outcome::{Failure, FailureKind};
 use affine_atlas::read::{self, ReadParams};
 use affine_atlas::verify::{self, SourceSurface, VerifyOptions};
 use cli::work::{
     ExplainRequest, Explained, FitRequest, FitResult, Inspection, RebuildRequest, RebuildResult,
-    SurveyRequest, Surveyed, TextureRequest, TextureResult, VerifyRequest, VerifyResult, Work,
+    Recorded, SurveyRequest, Surveyed, TextureRequest, TextureResult, VerifyRequest, VerifyResult,
+    Work,
 };
-use std::path::Path;
 use std::process::ExitCode;
 
 /// The one place where the command meets the library.
 const WORK: Work = Work {
-    build,
-    record,
+    batch,
+    decide,
+    work: batch::worker::work,
     inspect,
     survey,
     survey_folder,
@@ -37,27 +40,30 @@ const WORK: Work = Work {
     fit,
     texture,
     explain,
-    remove_staging: remove_all_staging,
+    remove_staging,
 };
 
 fn main() -> ExitCode {
     cli::main(&WORK)
 }
 
-fn build(asset: &Asset, output: &Path, config: &Config, observer: &dyn Observer) -> AssetOutcome {
-    let given = asset.given.to_string_lossy();
-    job::run(&asset.path, &given, output, &asset.id, config, observer)
+fn batch(batch: &Batch<'_>, tasks: &[Task], watcher: &dyn Watcher) -> Recorded {
+    let (outcomes, recorded) = batch::run(batch, tasks, watcher);
+    let page = || index::write(batch.output, &Manifest::load(batch.output)?.0);
+    let recorded = recorded.and_then(|()| page());
+    let recorded = recorded.map_err(|error| Failure::from(&BuildError::Export(error)));
+    (outcomes, recorded)
 }
 
-fn record(output: &Path, config: &Config, outcomes: &[AssetOutcome]) -> Result<(), Failure> {
-    let failure = |error| Failure::from(&BuildError::Export(error));
-    let (mut manifest, _) = Manifest::load(output).map_err(failure)?;
-    let config_hash = config.hash();
-    for outcome in outcomes {
-        manifest.insert(Record::of(outcome, &config_hash));
-    }
-    manifest.save(output).map_err(failure)?;
-    index::write(output, &manifest).map_err(failure)
+fn decide(batch: &Batch<'_>, tasks: &[Task]) -> Vec<Verdict> {
+    let known = Manifest::load(batch.output).map(|(manifest, _)| manifest);
+    batch::queue::decide(batch, tasks, &known.unwrap_or_default())
+}
+
+/// Ends what this program has started and removes what is half written.
+fn remove_staging() {
+    batch::queue::end_workers();
+    remove_all_staging();
 }
 
 fn inspect(asset: &Asset, config: &Config) -> Result<Inspection, Failure> {

@@ -1,8 +1,9 @@
 //! What became of an asset: what a job tells the command line and the manifest.
 
+use crate::export::folder::list_files;
 use crate::product::AffineAtlas;
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why an asset or a component was not built (`kind` in the manifest).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -92,7 +93,7 @@ impl Summary {
 }
 
 /// What became of one component.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ComponentOutcome {
     /// Which, from 0.
     pub index: usize,
@@ -101,10 +102,13 @@ pub struct ComponentOutcome {
 }
 
 /// What became of one asset as a whole.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum AssetState {
     /// Every component was built, unless `components` says otherwise.
     Built,
+    /// The outputs of an earlier run are whole, and input, configuration and version are the same.
+    Cached,
     /// Nothing was built for a reason that concerns the whole file.
     Failed(Failure),
     /// Stopped by the user.
@@ -112,7 +116,7 @@ pub enum AssetState {
 }
 
 /// What became of one asset.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AssetOutcome {
     /// Its id.
     pub id: String,
@@ -128,6 +132,12 @@ pub struct AssetOutcome {
     pub input_hash: Option<String>,
     /// What the reader left out.
     pub notes: Vec<String>,
+    /// Most memory that the asset's process held, bytes; absent where the system does not tell, or nothing was computed.
+    #[serde(default)]
+    pub peak_memory: Option<u64>,
+    /// Whether nothing was built but the result of an earlier run is still in place.
+    #[serde(default)]
+    pub kept: bool,
 }
 
 impl AssetOutcome {
@@ -142,6 +152,8 @@ impl AssetOutcome {
             files: Vec::new(),
             input_hash: None,
             notes: Vec::new(),
+            peak_memory: None,
+            kept: false,
         }
     }
 
@@ -151,11 +163,21 @@ impl AssetOutcome {
         Self::whole(id, AssetState::Failed(failure), seconds)
     }
 
+    /// Looks what is in place of an asset of which nothing was built: what an earlier run left there is kept.
+    pub fn look_for_older(&mut self, output: &Path) {
+        let new = matches!(self.state, AssetState::Built | AssetState::Cached)
+            && (self.components.is_empty() || self.components.iter().any(|c| c.result.is_ok()));
+        if !new {
+            self.files = list_files(&output.join(&self.id)).unwrap_or_default();
+            self.kept = !self.files.is_empty();
+        }
+    }
+
     /// Every failure, with its component where it concerns only one.
     pub fn failures(&self) -> impl Iterator<Item = (Option<usize>, &Failure)> {
         let whole = match &self.state {
             AssetState::Failed(failure) => Some((None, failure)),
-            AssetState::Built | AssetState::Cancelled => None,
+            AssetState::Built | AssetState::Cached | AssetState::Cancelled => None,
         };
         let parts = self.components.iter().filter_map(|component| {
             let failure = component.result.as_ref().err()?;
@@ -164,14 +186,15 @@ impl AssetOutcome {
         whole.into_iter().chain(parts)
     }
 
-    /// The word of the output contract: `built`, `failed` (also where only a component failed) or
-    /// `cancelled`.
+    /// The word of the output contract: `built`, `cached`, `failed` (also where only a component failed)
+    /// or `cancelled`.
     #[must_use]
     pub fn state_name(&self) -> &'static str {
         match self.state {
             AssetState::Cancelled => "cancelled",
             AssetState::Built if self.failures().next().is_none() => "built",
-            AssetState::Built | AssetState::Failed(_) => "failed",
+            AssetState::Cached if self.failures().next().is_none() => "cached",
+            AssetState::Built | AssetState::Cached | AssetState::Failed(_) => "failed",
         }
     }
 }

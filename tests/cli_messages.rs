@@ -188,7 +188,7 @@ fn unknown_key_like_no_other() {
     2 | wallpaper = 2
       : ^^^^^^^^^
       `----
-     help: known here: `run.threads`
+     help: known here: `run.jobs`, `run.threads`, `run.timeout`, `run.memory`, `run.total_memory`
     ");
 }
 
@@ -527,8 +527,9 @@ fn help() {
       -v, --verbose...           Show each step; twice: everything
           --log-format <FORMAT>  Progress and errors as text, or as one JSON object a line (both on
                                  standard error) [default: text] [possible values: text, json]
-          --threads <N>          Threads to use; 0 takes one for each core [default: run.threads of the
-                                 configuration]
+          --threads <N>          Threads to use, in `build` for each mesh; 0 takes one for each core,
+                                 shared by the meshes that are built at the same time [default:
+                                 run.threads of the configuration]
       -h, --help                 Print help (see more with '--help')
       -V, --version              Print version
 
@@ -547,19 +548,28 @@ fn help() {
 
     Arguments:
       [CONFIG|MESH]...  A configuration (ends in .toml), meshes (glTF, GLB, OBJ, PLY, STL, OFF), or
-                        both: meshes then take the place of `input.paths` [default: config.toml]
+                        both: meshes then take the place of `input.paths`. Folders, globs and `@LIST`, a
+                        text file with one of all these a line, stand for the meshes that are found
+                        [default: config.toml]
 
     Options:
           --set <KEY=VALUE>      Set a key of the configuration, for example `flow.scheme=thurston`; may
                                  be repeated
       -o, --out <DIR>            Folder for the atlases [default: output.folder of the configuration, or
                                  affine-atlas-out]
+      -f, --force                Build also what is there, whole, and of the same mesh, settings and
+                                 version
+      -n, --dry-run              Say what would be built, and why, and build nothing
+          --depfile <FILE>       Write for Make and Ninja which files OUT/manifest.jsonl was made from
+      -j, --jobs <N>             Meshes to build at the same time; 0 takes one for each core [default:
+                                 run.jobs of the configuration]
       -q, --quiet                Show errors only
       -v, --verbose...           Show each step; twice: everything
           --log-format <FORMAT>  Progress and errors as text, or as one JSON object a line (both on
                                  standard error) [default: text] [possible values: text, json]
-          --threads <N>          Threads to use; 0 takes one for each core [default: run.threads of the
-                                 configuration]
+          --threads <N>          Threads to use, in `build` for each mesh; 0 takes one for each core,
+                                 shared by the meshes that are built at the same time [default:
+                                 run.threads of the configuration]
       -h, --help                 Print help (see more with '--help')
 
     Examples:
@@ -567,9 +577,13 @@ fn help() {
       affine-atlas build bunny.obj --out atlases      one mesh, default settings
       affine-atlas build bunny.obj --set cones.strategy=spread --set cones.count=6
       affine-atlas build my.toml bunny.obj            settings of my.toml, another mesh
+      affine-atlas build scans 'lib/**/*.glb' @extra.txt --out atlases
+      affine-atlas build --dry-run                    what would be built, and why
 
     Each mesh becomes a folder OUT/NAME with atlas.json, atlas.npz, surface.glb, images/, pictures and
-    report.html. It appears when it is complete; an older good folder stays if the build fails.
+    report.html. It appears when it is complete; an older good folder stays if the build fails. Where mesh,
+    settings and version are the same as last time and the folder is whole, nothing is built. OUT also gets
+    manifest.jsonl and junit.xml (what became of each mesh), index.html (the same to look at) and logs/NAME.log.
     ");
     insta::assert_snapshot!(stdout(&run(folder.path(), &["cones", "-h"])), @r"
     Show what more or fewer cones gain, and write lists of them
@@ -578,7 +592,9 @@ fn help() {
 
     Arguments:
       [CONFIG|MESH]...  A configuration (ends in .toml), meshes (glTF, GLB, OBJ, PLY, STL, OFF), or
-                        both: meshes then take the place of `input.paths` [default: config.toml]
+                        both: meshes then take the place of `input.paths`. Folders, globs and `@LIST`, a
+                        text file with one of all these a line, stand for the meshes that are found
+                        [default: config.toml]
 
     Options:
           --set <KEY=VALUE>      Set a key of the configuration, for example `flow.scheme=thurston`; may
@@ -592,8 +608,9 @@ fn help() {
       -v, --verbose...           Show each step; twice: everything
           --log-format <FORMAT>  Progress and errors as text, or as one JSON object a line (both on
                                  standard error) [default: text] [possible values: text, json]
-          --threads <N>          Threads to use; 0 takes one for each core [default: run.threads of the
-                                 configuration]
+          --threads <N>          Threads to use, in `build` for each mesh; 0 takes one for each core,
+                                 shared by the meshes that are built at the same time [default:
+                                 run.threads of the configuration]
       -h, --help                 Print help (see more with '--help')
 
     Examples:
@@ -861,4 +878,139 @@ fn a_survey_keeps_what_is_not_its_own() {
     | tetra.cones/tetra.obj
     help: choose another folder with `--out`
     ");
+}
+
+/// A folder with two tetrahedra in folders of their own, and a configuration that finds them.
+fn two_sets(keys: &str) -> tempfile::TempDir {
+    let folder = folder();
+    for set in ["left", "right"] {
+        std::fs::create_dir_all(folder.path().join("meshes").join(set)).expect("made");
+        let path = folder.path().join("meshes").join(set).join("t.obj");
+        std::fs::write(path, TETRAHEDRON).expect("written");
+    }
+    let text = format!(
+        "[input]\npaths = [\"meshes\"]\n[cones]\nstrategy = \"spread\"\ncount = 4\n[patches]\ntexel_budget = 4096\n[pictures]\nenabled = false\n{keys}"
+    );
+    std::fs::write(folder.path().join("config.toml"), text).expect("written");
+    folder
+}
+
+#[test]
+fn inputs_that_name_nothing() {
+    let folder = two_sets("");
+    insta::assert_snapshot!(refusal(folder.path(), &["build", "*.ply"], 3), @r"
+    error: no mesh was found: *.ply matches no mesh file (gltf, glb, obj, ply, stl, off)
+    help: check names and folders; quotes keep the shell from replacing `*` by itself
+    ");
+    insta::assert_snapshot!(refusal(folder.path(), &["build", "@tonight.txt"], 2), @r"
+    error: the list tonight.txt cannot be read: No such file or directory (os error 2)
+    help: `@FILE` names a text file with a mesh, folder or glob on each line: check the name and
+          that it is UTF-8 text
+    ");
+    insta::assert_snapshot!(refusal(folder.path(), &["build", "meshes/[a"], 2), @r"
+    error: `meshes/[a` is no glob: invalid range pattern
+    help: `*` stands for any part of a name, `**` for any folders, `?` for one character, `[abc]`
+          for one of these; write `[[]` for a bracket
+    ");
+}
+
+#[test]
+fn tables_for_some_meshes_that_are_wrong() {
+    let refused = |keys: &str| refusal(two_sets(keys).path(), &["build"], 2);
+    insta::assert_snapshot!(refused("[[asset]]\nglob = \"*\"\nflow.shceme = \"thurston\"\n"), @r#"
+     error: unknown key `flow.shceme`
+       ,-[config.toml:12:6]
+    11 | glob = "*"
+    12 | flow.shceme = "thurston"
+       :      ^^^^^^
+       `----
+     help: did you mean `flow.scheme`?
+    "#);
+    insta::assert_snapshot!(refused("[[asset]]\nflow.scheme = \"thurston\"\n"), @r#"
+     error: an `[[asset]]` table says neither by `glob` nor by `path` which meshes it is for
+       ,-[config.toml:10:1]
+     9 | enabled = false
+    10 | [[asset]]
+       : ^^^^^^^^^
+    11 | flow.scheme = "thurston"
+       `----
+     help: give one of them, for example `glob = "scans/*.ply"`
+    "#);
+    insta::assert_snapshot!(refused("[[asset]]\nglob = \"*\"\nrun.jobs = 2\n"), @r#"
+     error: `run.jobs` concerns the whole run and not single meshes
+       ,-[config.toml:12:5]
+    11 | glob = "*"
+    12 | run.jobs = 2
+       :     ^^^^
+       `----
+     help: write it outside of the `[[asset]]` tables
+    "#);
+}
+
+/// What a dry run says before and after a build, and that it builds nothing.
+#[test]
+fn a_dry_run_says_why() {
+    let folder = two_sets(
+        "[[asset]]\nglob = \"meshes/left/*\"\npatches.padding = 3\n[[asset]]\npath = \"none.obj\"\n",
+    );
+    let dry = |arguments: &[&str]| {
+        let output = run(
+            folder.path(),
+            &[&["build", "--dry-run"], arguments].concat(),
+        );
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        (stdout(&output), stderr(&output))
+    };
+    let (said, warned) = dry(&[]);
+    insta::assert_snapshot!(said, @r"
+    build   left-t   new
+    build   right-t  new
+    2 of 2 would be built
+    ");
+    insta::assert_snapshot!(warned.trim_start(), @"WARN config.toml:13:1: no mesh of this run matches `none.obj`: this [[asset]] table has no effect");
+    assert!(!folder.path().join("affine-atlas-out").exists());
+    let output = run(folder.path(), &["build", "--quiet"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    insta::assert_snapshot!(dry(&[]).0, @r"
+    cached  left-t
+    cached  right-t
+    0 of 2 would be built
+    ");
+    insta::assert_snapshot!(dry(&["--set", "patches.padding=3"]).0, @r"
+    cached  left-t
+    build   right-t  configuration key patches.padding changed from 2 to 3
+    1 of 2 would be built
+    ");
+    insta::assert_snapshot!(dry(&["--force"]).0, @r"
+    build   left-t   forced
+    build   right-t  forced
+    2 of 2 would be built
+    ");
+    std::fs::write(folder.path().join("meshes/right/t.obj"), "v 0 0 0").expect("written");
+    std::fs::remove_file(folder.path().join("affine-atlas-out/left-t/atlas.npz")).expect("there");
+    insta::assert_snapshot!(dry(&[]).0, @r"
+    build   left-t   outputs missing: atlas.npz
+    build   right-t  input changed
+    2 of 2 would be built
+    ");
+    // The mesh that is refused now keeps its older folder, and says so.
+    let output = run(folder.path(), &["build", "--quiet"]);
+    assert_eq!(output.status.code(), Some(1));
+    insta::assert_snapshot!(stderr(&output).lines().last().unwrap_or_default(), @"failed: right-t (input): meshes/right/t.obj: holds no triangle (1 vertices, 0 faces); export a surface mesh, not points or curves; the older result was kept");
+    assert!(
+        folder
+            .path()
+            .join("affine-atlas-out/right-t/atlas.json")
+            .exists()
+    );
+}
+
+#[test]
+fn the_worker_is_for_builds_alone() {
+    let folder = folder();
+    let output = run(folder.path(), &["worker", "a.obj", "out"]);
+    assert_eq!(output.status.code(), Some(2));
+    insta::assert_snapshot!(stderr(&output), @"`affine-atlas worker` is for `affine-atlas build` alone: EOF while parsing a value at line 1 column 0");
+    let help = stdout(&run(folder.path(), &["--help"]));
+    assert!(!help.contains("worker"), "{help}");
 }

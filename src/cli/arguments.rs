@@ -46,7 +46,8 @@ pub struct Global {
         default_value_t
     )]
     pub log_format: LogFormat,
-    /// Threads to use; 0 takes one for each core [default: run.threads of the configuration]
+    /// Threads to use, in `build` for each mesh; 0 takes one for each core, shared by the meshes that are built at the same time
+    /// [default: run.threads of the configuration]
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
     pub threads: Option<u16>,
 }
@@ -93,6 +94,9 @@ pub enum Command {
     /// Write a configuration file that explains every key
     #[command(after_help = INIT_EXAMPLES, after_long_help = INIT_EXAMPLES)]
     Init(Init),
+    /// Build one mesh, told by `build` through a pipe
+    #[command(hide = true)]
+    Worker(Worker),
 }
 
 const EXPLAIN_EXAMPLES: &str = "\
@@ -116,9 +120,13 @@ Examples:
   affine-atlas build bunny.obj --out atlases      one mesh, default settings
   affine-atlas build bunny.obj --set cones.strategy=spread --set cones.count=6
   affine-atlas build my.toml bunny.obj            settings of my.toml, another mesh
+  affine-atlas build scans 'lib/**/*.glb' @extra.txt --out atlases
+  affine-atlas build --dry-run                    what would be built, and why
 
 Each mesh becomes a folder OUT/NAME with atlas.json, atlas.npz, surface.glb, images/, pictures and
-report.html. It appears when it is complete; an older good folder stays if the build fails.";
+report.html. It appears when it is complete; an older good folder stays if the build fails. Where mesh,
+settings and version are the same as last time and the folder is whole, nothing is built. OUT also gets
+manifest.jsonl and junit.xml (what became of each mesh), index.html (the same to look at) and logs/NAME.log.";
 
 const CHECK_EXAMPLES: &str = "\
 Examples:
@@ -197,7 +205,7 @@ Examples:
 #[derive(Debug, Args)]
 pub struct Inputs {
     /// A configuration (ends in .toml), meshes (glTF, GLB, OBJ, PLY, STL, OFF), or both: meshes
-    /// then take the place of `input.paths` [default: config.toml]
+    /// then take the place of `input.paths`. Folders, globs and `@LIST`, a text file with one of all these a line, stand for the meshes that are found [default: config.toml]
     #[arg(value_name = "CONFIG|MESH")]
     pub inputs: Vec<PathBuf>,
     /// Set a key of the configuration, for example `flow.scheme=thurston`; may be repeated
@@ -212,6 +220,27 @@ pub struct Build {
     /// Folder for the atlases [default: output.folder of the configuration, or affine-atlas-out]
     #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Build also what is there, whole, and of the same mesh, settings and version
+    #[arg(short, long)]
+    pub force: bool,
+    /// Say what would be built, and why, and build nothing
+    #[arg(short = 'n', long)]
+    pub dry_run: bool,
+    /// Write for Make and Ninja which files OUT/manifest.jsonl was made from
+    #[arg(long, value_name = "FILE")]
+    pub depfile: Option<PathBuf>,
+    /// Meshes to build at the same time; 0 takes one for each core [default: run.jobs of the configuration]
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
+    pub jobs: Option<u16>,
+}
+
+/// What `build` tells a worker beside its job.
+#[derive(Debug, Args)]
+pub struct Worker {
+    /// The mesh
+    pub input: PathBuf,
+    /// The output root
+    pub output: PathBuf,
 }
 
 #[derive(Debug, Args)]

@@ -1,70 +1,140 @@
 //! `affine-atlas build`.
 
 use super::arguments::{Build, Global, LogFormat};
-use super::plan::{Plan, plan, start_threads};
+use super::plan::{Plan, plan};
 use super::problem::Problem;
 use super::progress::Progress;
 use super::work::Work;
-use super::{exit, interrupt, panics, summary, terminal};
-use affine_atlas::config::assets::Asset;
-use affine_atlas::observe::Observer;
-use affine_atlas::outcome::{AssetOutcome, AssetState, Failure, FailureKind};
-use std::time::Instant;
+use super::{check, exit, interrupt, summary, terminal};
+use affine_atlas::batch::cache::Verdict;
+use affine_atlas::batch::records::{depfile, junit};
+use affine_atlas::batch::worker::Voice;
+use affine_atlas::batch::{Batch, Task};
+use affine_atlas::outcome::{AssetOutcome, AssetState, FailureKind};
+use std::path::{Path, PathBuf};
+
+/// What makes this program a worker.
+const WORKER: &[&str] = &["worker"];
 
 /// Builds every asset, shows what became of each, and gives the exit code.
 pub fn run(build: &Build, global: &Global, work: &Work) -> Result<u8, Problem> {
     let plan = plan(&build.inputs, build.out.as_deref())?;
     plan.keep_inputs(|asset| plan.folder(asset))?;
-    start_threads(global.threads, &plan.config)?;
+    let tasks = plan.tasks();
+    let batch = Batch {
+        output: &plan.output,
+        program: program()?,
+        arguments: WORKER,
+        force: build.force,
+        jobs: build.jobs.map_or(plan.config.run.jobs, usize::from),
+        total_memory: plan.config.run.total_memory,
+        threads: global.threads.map(usize::from),
+        voice: voice(global),
+    };
+    if build.dry_run {
+        return Ok(show_decisions(
+            &tasks,
+            &(work.decide)(&batch, &tasks),
+            global,
+        ));
+    }
     let announce = !global.quiet && global.log_format == LogFormat::Text;
     interrupt::install(work.remove_staging, announce);
-    let progress = Progress::new(global, plan.assets.len());
-    let outcomes = build_all(&plan, &progress, work);
+    let progress = Progress::new(global, tasks.len());
+    let (outcomes, recorded) = (work.batch)(&batch, &tasks, &progress);
     progress.finish();
-    let recorded = (work.record)(&plan.output, &plan.config, &outcomes);
+    let recorded = recorded.map_err(|failure| Problem::NotRecorded {
+        path: plan.output.join("manifest.jsonl"),
+        reason: failure.message,
+    });
+    if outcomes.is_empty() {
+        recorded?;
+        return Ok(exit::NOTHING_TO_DO);
+    }
     if !global.quiet {
-        terminal::print(&summary::table(&outcomes, terminal::stdout_width()));
+        terminal::print(&summary::results(&outcomes, terminal::stdout_width()));
     }
     if global.log_format == LogFormat::Text {
         terminal::print_error(&summary::failures(&outcomes));
     }
-    if interrupt::requested() {
-        (work.remove_staging)();
-    }
-    if let Err(failure) = recorded {
-        return Err(Problem::NotRecorded {
-            path: plan.output.join("manifest.jsonl"),
-            reason: failure.message,
-        });
-    }
+    recorded?;
+    write_records(build, &plan, &tasks, &outcomes)?;
     Ok(exit_code(&outcomes))
 }
 
-fn build_all(plan: &Plan, progress: &Progress, work: &Work) -> Vec<AssetOutcome> {
-    let mut outcomes = Vec::with_capacity(plan.assets.len());
-    for (index, asset) in plan.assets.iter().enumerate() {
-        let observer = progress.asset(&asset.id, index);
-        let outcome = build_one(plan, asset, &observer, work);
-        progress.done(&outcome, index);
-        outcomes.push(outcome);
+/// This program itself, also where its file has been replaced since it was started.
+fn program() -> Result<PathBuf, Problem> {
+    let file = std::env::current_exe();
+    let running = Path::new("/proc/self/exe");
+    match file {
+        // Linux names a file that is gone by a path that does not exist.
+        Ok(file) if file.exists() => Ok(file),
+        _ if running.exists() => Ok(running.to_owned()),
+        file => Err(Problem::Internal(format!(
+            "internal error: this program cannot find itself: {file:?}"
+        ))),
     }
-    outcomes
 }
 
-/// A panic while an asset is built is that asset's failure; the others go on.
-fn build_one(plan: &Plan, asset: &Asset, observer: &dyn Observer, work: &Work) -> AssetOutcome {
-    let start = Instant::now();
-    if observer.cancelled() {
-        return AssetOutcome::whole(&asset.id, AssetState::Cancelled, 0.0);
+fn voice(global: &Global) -> Voice {
+    let json = global.log_format == LogFormat::Json;
+    let steps = match global.verbose {
+        0 if terminal::stderr_is_terminal() && !global.quiet && !json => Some(100),
+        0 => None,
+        _ => Some(0),
+    };
+    Voice {
+        quiet: global.quiet,
+        verbose: global.verbose,
+        json,
+        colours: console::colors_enabled_stderr(),
+        steps,
     }
-    let build = || (work.build)(asset, &plan.output, &plan.config, observer);
-    panics::catch(build).unwrap_or_else(|panic| {
-        let failure = Failure {
-            kind: FailureKind::Internal,
-            message: panic,
-        };
-        AssetOutcome::failed(&asset.id, failure, start.elapsed().as_secs_f64())
-    })
+}
+
+/// One line a mesh: what a build would do with it, and why.
+fn show_decisions(tasks: &[Task], verdicts: &[Verdict], global: &Global) -> u8 {
+    let width = tasks.iter().map(|task| task.id.len()).max().unwrap_or(0);
+    let mut text = String::new();
+    let mut builds = 0;
+    for (task, verdict) in tasks.iter().zip(verdicts) {
+        let id = &task.id;
+        match verdict {
+            Verdict::Cached(_) => text.push_str(&format!("cached  {id}\n")),
+            Verdict::Build(reason) => {
+                builds += 1;
+                text.push_str(&format!("build   {id:width$}  {reason}\n"));
+            }
+        }
+    }
+    text.push_str(&format!("{builds} of {} would be built\n", tasks.len()));
+    if !global.quiet {
+        terminal::print(&text);
+    }
+    exit::GOOD
+}
+
+/// What other programs read.
+fn write_records(
+    build: &Build,
+    plan: &Plan,
+    tasks: &[Task],
+    outcomes: &[AssetOutcome],
+) -> Result<(), Problem> {
+    let junit_xml = plan.output.join("junit.xml");
+    check::write_whole(&junit_xml, junit(outcomes).as_bytes()).map_err(
+        |problem| match problem {
+            Problem::NotWritten { path, reason } => Problem::NotRecorded { path, reason },
+            other => other,
+        },
+    )?;
+    if let Some(path) = &build.depfile {
+        let files = tasks.iter().flat_map(|task| &task.files);
+        let files = files.chain(&plan.files).map(PathBuf::as_path);
+        let text = depfile(&plan.output.join("manifest.jsonl"), files);
+        check::write_whole(path, text.as_bytes())?;
+    }
+    Ok(())
 }
 
 /// The worst that happened.
@@ -88,14 +158,7 @@ pub(super) fn exit_code(outcomes: &[AssetOutcome]) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::work::Surveyed;
-    use affine_atlas::config::Config;
-    use affine_atlas::outcome::ComponentOutcome;
-    use std::path::{Path, PathBuf};
-
-    fn built(id: &str) -> AssetOutcome {
-        AssetOutcome::whole(id, AssetState::Built, 0.0)
-    }
+    use affine_atlas::outcome::{ComponentOutcome, Failure};
 
     fn failure(kind: FailureKind) -> Failure {
         Failure {
@@ -104,105 +167,29 @@ mod tests {
         }
     }
 
-    /// Does what the asset's name says.
-    fn fake(asset: &Asset, _: &Path, _: &Config, _: &dyn Observer) -> AssetOutcome {
-        match asset.id.as_str() {
-            "panics" => panic!("index {} out of range", 7),
-            "refused" => AssetOutcome::failed(&asset.id, failure(FailureKind::Input), 0.0),
-            "half" => AssetOutcome {
-                components: vec![ComponentOutcome {
-                    index: 3,
-                    result: Err(failure(FailureKind::Prescription)),
-                }],
-                ..built(&asset.id)
-            },
-            id => built(id),
-        }
-    }
-
-    const FAKE: Work = Work {
-        build: fake,
-        record: |_, _, _| Ok(()),
-        inspect: |_, _| {
-            Err(Failure {
-                kind: FailureKind::Input,
-                message: String::new(),
-            })
-        },
-        survey: |request, _| Surveyed {
-            text: String::new(),
-            json: None,
-            suggested: None,
-            outcome: built(&request.asset.id),
-        },
-        survey_folder: str::to_owned,
-        verify: |_| {
-            Err(Failure {
-                kind: FailureKind::Input,
-                message: String::new(),
-            })
-        },
-        rebuild: |_| {
-            Err(Failure {
-                kind: FailureKind::Input,
-                message: String::new(),
-            })
-        },
-        fit: |_| {
-            Err(Failure {
-                kind: FailureKind::Input,
-                message: String::new(),
-            })
-        },
-        texture: |_| {
-            Err(Failure {
-                kind: FailureKind::Input,
-                message: String::new(),
-            })
-        },
-        explain: |_| {
-            Err(Failure {
-                kind: FailureKind::Input,
-                message: String::new(),
-            })
-        },
-        remove_staging: || {},
-    };
-
-    fn outcomes(names: &[&str]) -> Vec<AssetOutcome> {
-        let paths: Vec<PathBuf> = names
-            .iter()
-            .map(|name| format!("{name}.obj").into())
-            .collect();
-        let plan = Plan {
-            config: Config::default(),
-            output: PathBuf::from("out"),
-            assets: affine_atlas::config::assets::name_assets(&paths, Path::new("")),
-        };
-        let quiet = Global {
-            quiet: true,
-            ..Global::default()
-        };
-        build_all(&plan, &Progress::new(&quiet, names.len()), &FAKE)
-    }
-
     #[test]
     fn exit_codes() {
-        assert_eq!(exit_code(&outcomes(&["a", "b"])), exit::GOOD);
-        assert_eq!(exit_code(&outcomes(&["a", "refused"])), exit::SOME_FAILED);
-        assert_eq!(exit_code(&outcomes(&["half"])), exit::SOME_FAILED);
-        let mut cancelled = outcomes(&["a", "refused"]);
-        cancelled[0].state = AssetState::Cancelled;
-        assert_eq!(exit_code(&cancelled), exit::INTERRUPTED);
-    }
-
-    #[test]
-    fn a_panic_fails_one_asset_and_the_others_go_on() {
-        let outcomes = outcomes(&["a", "panics", "b"]);
-        let states: Vec<&str> = outcomes.iter().map(AssetOutcome::state_name).collect();
-        assert_eq!(states, ["built", "failed", "built"]);
-        let (_, failure) = outcomes[1].failures().next().expect("one failure");
-        assert!(failure.message.starts_with("internal error:"));
-        assert_eq!(exit_code(&outcomes), exit::INTERNAL);
+        let built = || AssetOutcome::whole("a", AssetState::Built, 0.0);
+        let cached = || AssetOutcome::whole("b", AssetState::Cached, 0.0);
+        let failed = |kind| AssetOutcome::failed("c", failure(kind), 0.0);
+        assert_eq!(exit_code(&[built(), cached()]), exit::GOOD);
+        for kind in [
+            FailureKind::Input,
+            FailureKind::Timeout,
+            FailureKind::Memory,
+            FailureKind::Output,
+        ] {
+            assert_eq!(exit_code(&[built(), failed(kind)]), exit::SOME_FAILED);
+        }
+        let mut half = built();
+        half.components.push(ComponentOutcome {
+            index: 3,
+            result: Err(failure(FailureKind::Prescription)),
+        });
+        assert_eq!(exit_code(&[half]), exit::SOME_FAILED);
+        let internal = failed(FailureKind::Internal);
+        assert_eq!(exit_code(&[built(), internal.clone()]), exit::INTERNAL);
+        let cancelled = AssetOutcome::whole("d", AssetState::Cancelled, 0.0);
+        assert_eq!(exit_code(&[internal, cancelled]), exit::INTERRUPTED);
     }
 }

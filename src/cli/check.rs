@@ -15,9 +15,9 @@ pub fn run(check: &Check, global: &Global, work: &Work) -> Result<u8, Problem> {
     let plan = plan(&check.inputs, None)?;
     start_threads(global.threads, &plan.config)?;
     let mut code = exit::GOOD;
-    for asset in &plan.assets {
+    for (asset, settings) in plan.items() {
         let inspected =
-            panics::catch(|| (work.inspect)(asset, &plan.config)).unwrap_or_else(|panic| {
+            panics::catch(|| (work.inspect)(asset, &settings.config)).unwrap_or_else(|panic| {
                 Err(Failure {
                     kind: FailureKind::Internal,
                     message: panic,

@@ -7,6 +7,7 @@ use super::problem::Problem;
 use super::progress::Progress;
 use super::work::{SurveyRequest, Surveyed, Work};
 use super::{interrupt, panics, summary, terminal};
+use affine_atlas::config::Config;
 use affine_atlas::config::assets::Asset;
 use affine_atlas::observe::Observer;
 use affine_atlas::outcome::{AssetOutcome, AssetState, Failure, FailureKind};
@@ -24,9 +25,16 @@ pub fn run(cones: &Cones, global: &Global, work: &Work) -> Result<u8, Problem> {
     interrupt::install(work.remove_staging, announce);
     let progress = Progress::new(global, plan.assets.len()).calling_it("surveyed");
     let mut surveyed = Vec::with_capacity(plan.assets.len());
-    for (index, asset) in plan.assets.iter().enumerate() {
+    for (index, (asset, settings)) in plan.items().enumerate() {
         let observer = progress.asset(&asset.id, index);
-        let one = survey_one(&plan, asset, counts.as_deref(), &observer, work);
+        let one = survey_one(
+            &plan,
+            asset,
+            &settings.config,
+            counts.as_deref(),
+            &observer,
+            work,
+        );
         progress.done(&one.outcome, index);
         surveyed.push(one);
     }
@@ -53,6 +61,7 @@ pub fn run(cones: &Cones, global: &Global, work: &Work) -> Result<u8, Problem> {
 fn survey_one(
     plan: &Plan,
     asset: &Asset,
+    config: &Config,
     counts: Option<&[usize]>,
     observer: &dyn Observer,
     work: &Work,
@@ -70,7 +79,7 @@ fn survey_one(
     let request = SurveyRequest {
         asset,
         output: &plan.output,
-        config: &plan.config,
+        config,
         counts,
     };
     let survey = || (work.survey)(&request, observer);

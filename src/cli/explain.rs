@@ -90,13 +90,11 @@ fn requests(explain: &Explain, global: &Global) -> Result<Vec<ExplainRequest>, P
     }
     let plan = plan(&explain.inputs, None)?;
     start_threads(global.threads, &plan.config)?;
-    let request = |path: &Path| ExplainRequest {
-        asset: path.to_owned(),
-        config: plan.config.clone(),
-    };
-    Ok(plan
-        .assets
-        .iter()
-        .map(|asset| request(&asset.path))
+    let requests = plan.assets.iter().zip(&plan.settings);
+    Ok(requests
+        .map(|(asset, settings)| ExplainRequest {
+            asset: asset.path.clone(),
+            config: settings.config.clone(),
+        })
         .collect())
 }

@@ -20,6 +20,7 @@ mod terminal;
 mod texture;
 mod verify;
 pub mod work;
+mod worker;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
@@ -48,8 +49,11 @@ pub fn main(work: &Work) -> ExitCode {
     terminal::decide_colours();
     // Wrong arguments end here with exit code 2, `--help` and `--version` with 0.
     let arguments = Arguments::parse();
-    log::start(&arguments.global);
     panics::keep_quiet();
+    if let Command::Worker(worker) = &arguments.command {
+        return worker::run(worker, work);
+    }
+    log::start(&arguments.global);
     let code = match panics::catch(|| run(&arguments, work)) {
         Ok(Ok(code)) => code,
         Ok(Err(problem)) => {
@@ -78,5 +82,7 @@ fn run(arguments: &Arguments, work: &Work) -> Result<u8, Problem> {
         Command::Explain(explain) => explain::run(explain, global, work),
         Command::Schema(asked) => schema::run(asked),
         Command::Init(init) => init::run(init, global),
+        // Ended in `main`.
+        Command::Worker(_) => Ok(exit::USAGE),
     }
 }

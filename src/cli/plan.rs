@@ -2,9 +2,13 @@
 
 use super::arguments::Inputs;
 use super::problem::Problem;
+use affine_atlas::batch::{Settings, Task, inputs};
 use affine_atlas::config::assets::{Asset, name_assets};
-use affine_atlas::config::{self, Config};
+use affine_atlas::config::{self, Config, Loaded};
+use rayon::prelude::*;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What is to be done.
 #[derive(Debug)]
@@ -15,11 +19,15 @@ pub struct Plan {
     pub output: PathBuf,
     /// At least one.
     pub assets: Vec<Asset>,
+    /// The settings of each asset.
+    pub settings: Vec<Arc<Settings>>,
+    /// Files that were read to make the plan.
+    pub files: Vec<PathBuf>,
 }
 
 /// Reads the configuration and names the assets.
 ///
-/// Positional arguments that end in `.toml` are a configuration, all others are meshes and take
+/// Positional arguments that end in `.toml` are a configuration, all others name meshes and take
 /// the place of `input.paths`. Meshes without a configuration use the defaults; `config.toml` is
 /// read only where nothing is named at all.
 pub fn plan(inputs: &Inputs, out: Option<&Path>) -> Result<Plan, Problem> {
@@ -53,12 +61,54 @@ pub fn plan(inputs: &Inputs, out: Option<&Path>) -> Result<Plan, Problem> {
         return Err(Problem::NoInputs);
     }
     let output = loaded.output_folder();
-    let assets = name_assets(&loaded.config.input.paths, &loaded.input_base);
+    let inputs = inputs::expand(&loaded.config.input.paths, &loaded.input_base, &output)?;
+    if inputs.files.is_empty() {
+        return Err(Problem::NothingFound {
+            notes: inputs.notes,
+        });
+    }
+    for note in &inputs.notes {
+        tracing::warn!("{note}");
+    }
+    let assets = name_assets(inputs.files);
+    let settings = settings(&mut loaded, &assets)?;
+    let mut files = loaded.files;
+    files.extend(inputs.lists);
     Ok(Plan {
+        settings,
         config: loaded.config,
         output,
         assets,
+        files,
     })
+}
+
+/// The settings of each asset; those for which the same tables are share theirs.
+fn settings(loaded: &mut Loaded, assets: &[Asset]) -> Result<Vec<Arc<Settings>>, Problem> {
+    let mut known: HashMap<Vec<usize>, Arc<Settings>> = HashMap::new();
+    let mut of_assets = Vec::with_capacity(assets.len());
+    for asset in assets {
+        let tables = loaded.overrides_for(&asset.given);
+        let settings = match known.get(&tables) {
+            Some(settings) => Arc::clone(settings),
+            None => {
+                let settings = Arc::new(Settings::new(loaded.config_with(&tables)?));
+                known.insert(tables, Arc::clone(&settings));
+                settings
+            }
+        };
+        of_assets.push(settings);
+    }
+    for (i, table) in loaded.overrides().iter().enumerate() {
+        if !known.keys().any(|tables| tables.contains(&i)) {
+            let pattern = &table.pattern;
+            tracing::warn!(
+                "{}: no mesh of this run matches `{pattern}`: this [[asset]] table has no effect",
+                table.at
+            );
+        }
+    }
+    Ok(of_assets)
 }
 
 fn is_config(path: &Path) -> bool {
@@ -72,24 +122,38 @@ impl Plan {
         self.output.join(&asset.id)
     }
 
+    /// Every asset with its settings.
+    pub fn items(&self) -> impl Iterator<Item = (&Asset, &Arc<Settings>)> {
+        self.assets.iter().zip(&self.settings)
+    }
+
+    /// What is to be done, once all input files have been hashed.
+    pub fn tasks(&self) -> Vec<Task> {
+        let items: Vec<_> = self.items().collect();
+        let look = |&(asset, settings): &(&Asset, &Arc<Settings>)| Task::new(asset, settings);
+        items.par_iter().map(look).collect()
+    }
+
     /// Refuses a plan in which an asset's folder, which is replaced as a whole, holds an input:
     /// `build spot/spot.obj --out .` must not delete `spot/spot.obj`.
     /// `folder` is that of an asset.
     pub fn keep_inputs(&self, folder: impl Fn(&Asset) -> PathBuf) -> Result<(), Problem> {
-        for folder in self.assets.iter().map(folder) {
-            let Ok(real) = folder.canonicalize() else {
-                continue; // Does not exist, so nothing is in it.
+        let folders = self.assets.iter().map(folder);
+        // A folder that does not exist holds nothing.
+        let real = folders.filter_map(|folder| Some((folder.canonicalize().ok()?, folder)));
+        let real: HashMap<PathBuf, PathBuf> = real.collect();
+        if real.is_empty() {
+            return Ok(());
+        }
+        for input in self.assets.iter().map(|asset| &asset.path) {
+            let Ok(resolved) = input.canonicalize() else {
+                continue;
             };
-            for input in self.assets.iter().map(|asset| &asset.path) {
-                if input
-                    .canonicalize()
-                    .is_ok_and(|input| input.starts_with(&real))
-                {
-                    return Err(Problem::OverwritesInput {
-                        folder,
-                        input: input.clone(),
-                    });
-                }
+            if let Some(folder) = resolved.ancestors().find_map(|above| real.get(above)) {
+                return Err(Problem::OverwritesInput {
+                    folder: folder.clone(),
+                    input: input.clone(),
+                });
             }
         }
         Ok(())

@@ -2,6 +2,7 @@
 
 use super::arguments::LogFormat;
 use super::{exit, terminal};
+use affine_atlas::batch::inputs::InputError;
 use affine_atlas::config::ConfigError;
 use miette::{
     Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource, SourceCode,
@@ -17,8 +18,12 @@ pub enum Problem {
     Config(#[from] ConfigError),
     #[error("two configurations are named, {} and {}", first.display(), second.display())]
     TwoConfigs { first: PathBuf, second: PathBuf },
+    #[error(transparent)]
+    Input(#[from] InputError),
     #[error("no mesh is named: `input.paths` is empty")]
     NoInputs,
+    #[error("no mesh was found: {}", notes.join("; "))]
+    NothingFound { notes: Vec<String> },
     #[error(
         "the output folder {} of this run would replace the folder of its input {}",
         folder.display(), input.display()
@@ -46,7 +51,7 @@ impl Problem {
     /// Exit code of the output contract.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::NoInputs => exit::NOTHING_TO_DO,
+            Self::NoInputs | Self::NothingFound { .. } => exit::NOTHING_TO_DO,
             Self::NotRecorded { .. } => exit::SOME_FAILED,
             Self::Internal(_) => exit::INTERNAL,
             _ => exit::USAGE,
@@ -61,6 +66,10 @@ impl Problem {
             }
             Self::NoInputs => {
                 "name a mesh: `affine-atlas build MESH`, or list meshes in `input.paths`"
+            }
+            Self::Input(error) => error.remedy(),
+            Self::NothingFound { .. } => {
+                "check names and folders; quotes keep the shell from replacing `*` by itself"
             }
             Self::OverwritesInput { .. } => "choose another folder with `--out`",
             Self::Exists { .. } => "choose another name, or replace it with `--force`",

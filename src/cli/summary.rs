@@ -20,6 +20,38 @@ const LEAVE_OUT: [usize; 6] = [8, 4, 5, 7, 2, 3];
 const WORDS: usize = 2;
 const FOLDER: &str = "folder";
 
+/// More assets than this are not listed one by one.
+const MOST_LISTED: usize = 40;
+
+/// What became of a batch: the table, of many assets only of those that are not as they should be, and counts where there are several.
+pub fn results(outcomes: &[AssetOutcome], width: Option<usize>) -> String {
+    let count = |state: &str| outcomes.iter().filter(|o| o.state_name() == state).count();
+    let mut text = match outcomes.len() {
+        0..=MOST_LISTED => table(outcomes, width),
+        _ => {
+            let rest = outcomes.iter().filter(|o| o.state_name() == "failed");
+            let rest: Vec<AssetOutcome> = rest.cloned().collect();
+            match rest.is_empty() {
+                true => String::new(),
+                false => table(&rest, width),
+            }
+        }
+    };
+    if outcomes.len() > 1 {
+        let counts = ["built", "cached", "failed", "cancelled"].map(|state| (count(state), state));
+        let counts = counts.iter().filter(|(count, _)| *count > 0);
+        let counts: Vec<String> = counts
+            .map(|(count, state)| format!("{count} {state}"))
+            .collect();
+        text.push_str(&format!(
+            "{} meshes: {}\n",
+            outcomes.len(),
+            counts.join(", ")
+        ));
+    }
+    text
+}
+
 struct Row {
     cells: [String; 9],
     folder: String,
@@ -76,7 +108,7 @@ pub fn table(outcomes: &[AssetOutcome], width: Option<usize>) -> String {
             .map(|&column| {
                 let cell = pad(&row.cells[column], widths[column], column);
                 match (column, row.state) {
-                    (1, "built") => style(cell).green().to_string(),
+                    (1, "built" | "cached") => style(cell).green().to_string(),
                     (1, "failed") => style(cell).red().to_string(),
                     (1, _) => style(cell).yellow().to_string(),
                     _ => cell,
@@ -205,8 +237,12 @@ pub fn failures(outcomes: &[AssetOutcome]) -> String {
                 _ => outcome.id.clone(),
             };
             let label = style("failed").red().for_stderr();
+            let kept = match outcome.kept {
+                true => "; the older result was kept",
+                false => "",
+            };
             text.push_str(&format!(
-                "{label}: {place} ({}): {}\n",
+                "{label}: {place} ({}): {}{kept}\n",
                 failure.kind.name(),
                 failure.message
             ));
@@ -323,6 +359,30 @@ mod tests {
           component 1  failed
         möbius         failed
         ");
+    }
+
+    #[test]
+    fn many_are_counted_and_only_failures_listed() {
+        let mut outcomes = sample();
+        for i in 0..50 {
+            outcomes.push(AssetOutcome::whole(
+                &format!("a{i}"),
+                AssetState::Cached,
+                0.0,
+            ));
+        }
+        outcomes[2].kept = true;
+        insta::assert_snapshot!(results(&outcomes, Some(60)), @r"
+        mesh           state         vertices  faces  max error
+        truck          1 of 2 built
+          component 0  built             2930   5856    3.1e-13
+          component 1  failed
+        möbius         failed
+        53 meshes: 1 built, 50 cached, 2 failed
+        ");
+        assert!(failures(&outcomes).ends_with("add a cone; the older result was kept\n"));
+        assert!(!results(&outcomes[..1], None).contains("meshes:"));
+        assert_eq!(results(&outcomes[3..], None), "50 meshes: 50 cached\n");
     }
 
     #[test]

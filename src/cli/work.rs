@@ -1,5 +1,8 @@
 //! What the command line asks of the library.
 
+use affine_atlas::batch::cache::Verdict;
+use affine_atlas::batch::worker::Job;
+use affine_atlas::batch::{Batch, Task, Watcher};
 use affine_atlas::config::Config;
 use affine_atlas::config::assets::Asset;
 use affine_atlas::job::texture::TextureParams;
@@ -9,10 +12,12 @@ use std::path::{Path, PathBuf};
 
 /// Functions of the library that the commands call. Tests put their own in.
 pub struct Work {
-    /// Builds one asset into its folder below the output folder given.
-    pub build: fn(&Asset, &Path, &Config, &dyn Observer) -> AssetOutcome,
-    /// Writes what became of all assets into the output folder (the manifest).
-    pub record: fn(&Path, &Config, &[AssetOutcome]) -> Result<(), Failure>,
+    /// Builds what is not whole, each asset in a process of its own, and writes down what became of it.
+    pub batch: fn(&Batch<'_>, &[Task], &dyn Watcher) -> Recorded,
+    /// Says what a batch would build.
+    pub decide: fn(&Batch<'_>, &[Task]) -> Vec<Verdict>,
+    /// Does a worker's job: input, output root.
+    pub work: fn(&Job, &Path, &Path) -> AssetOutcome,
     /// Says what a build would do, without building.
     pub inspect: fn(&Asset, &Config) -> Result<Inspection, Failure>,
     /// Flattens one asset with different numbers of cones and writes what came of it into a folder below the output folder
@@ -33,6 +38,9 @@ pub struct Work {
     /// Removes folders that are being written. Called once before the program is stopped.
     pub remove_staging: fn(),
 }
+
+/// What became of every asset, and whether that could be written down.
+pub type Recorded = (Vec<AssetOutcome>, Result<(), Failure>);
 
 /// What `check` says of one asset.
 pub struct Inspection {

@@ -2,6 +2,7 @@
 
 use super::error::{ConfigError, Location};
 use super::keys::{self, Kind};
+use super::overrides::OF_THE_RUN;
 use crate::flow::cones::PiMultiple;
 use std::ops::Range;
 use std::sync::Arc;
@@ -9,6 +10,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// A configuration text and what to call it.
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Source {
     /// The file as given, or `--set`.
     pub name: String,
@@ -17,6 +19,13 @@ pub(super) struct Source {
 }
 
 impl Source {
+    pub fn new(name: &str, text: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            text: Arc::from(text),
+        }
+    }
+
     pub fn at(&self, span: Range<usize>) -> Box<Location> {
         Box::new(Location::new(&self.name, &self.text, span))
     }
@@ -39,21 +48,60 @@ fn check_table(source: &Source, table: &DeTable<'_>, prefix: &str, errors: &mut 
             "" => name.get_ref().to_string(),
             prefix => format!("{prefix}.{}", name.get_ref()),
         };
-        if let Some(key) = keys::find(&path) {
-            check_value(source, &path, key.kind, value, errors);
-        } else if keys::is_section(&path) {
-            match value.get_ref() {
-                DeValue::Table(inner) => check_table(source, inner, &path, errors),
-                other => errors.push(ConfigError::WrongType {
-                    at: source.at(value.span()),
-                    expected: format!("keys of its own, written below a line [{path}]"),
-                    got: describe(other),
-                    key: path,
-                }),
-            }
-        } else {
-            errors.push(unknown_key(source, name.span(), path, value.get_ref()));
+        check_entry(source, name.span(), path, value, errors);
+    }
+}
+
+fn check_entry(
+    source: &Source,
+    name: Range<usize>,
+    path: String,
+    value: &Spanned<DeValue<'_>>,
+    errors: &mut Vec<ConfigError>,
+) {
+    if let Some(key) = keys::find(&path) {
+        check_value(source, &path, key.kind, value, errors);
+    } else if keys::is_section(&path) {
+        match value.get_ref() {
+            DeValue::Table(inner) => check_table(source, inner, &path, errors),
+            other => errors.push(ConfigError::WrongType {
+                at: source.at(value.span()),
+                expected: format!("keys of its own, written below a line [{path}]"),
+                got: describe(other),
+                key: path,
+            }),
         }
+    } else {
+        errors.push(unknown_key(source, name, path, value.get_ref()));
+    }
+}
+
+/// An `[[asset]]` table: which meshes, and any key that does not concern the whole run.
+fn check_override(source: &Source, table: &DeTable<'_>, errors: &mut Vec<ConfigError>) {
+    let not_for_one = |span: Range<usize>, key: String| ConfigError::NotForOneAsset {
+        at: source.at(span),
+        key,
+    };
+    for (name, value) in table {
+        let key = name.get_ref().to_string();
+        if OF_THE_RUN.contains(&key.as_str()) {
+            errors.push(not_for_one(name.span(), key));
+            continue;
+        }
+        if let DeValue::Table(members) = value.get_ref() {
+            for (member, _) in members {
+                let key = format!("{key}.{}", member.get_ref());
+                if OF_THE_RUN.contains(&key.as_str()) {
+                    errors.push(not_for_one(member.span(), key));
+                }
+            }
+        }
+        let is_setting = keys::is_section(&key) || keys::find(&key).is_some();
+        let path = match is_setting {
+            true => key,
+            false => format!("asset[].{key}"),
+        };
+        check_entry(source, name.span(), path, value, errors);
     }
 }
 
@@ -187,8 +235,11 @@ fn check_value(
         (Kind::Tables(_), DeValue::Array(items)) => {
             for item in items {
                 match item.get_ref() {
+                    DeValue::Table(table) if path == "asset" => {
+                        check_override(source, table, errors);
+                    }
                     DeValue::Table(table) => {
-                        check_table(source, table, &format!("{path}[]"), errors)
+                        check_table(source, table, &format!("{path}[]"), errors);
                     }
                     _ => errors.push(wrong_type(item, kind)),
                 }

@@ -190,6 +190,22 @@ pub enum ConfigError {
         "`patches.packed_side` packs flat images into one, but `images.domain` is \"rectangle\""
     )]
     PackedRectangles,
+    /// A key of an `[[asset]]` table that no single mesh can have.
+    #[error("{at}: `{key}` concerns the whole run and not single meshes")]
+    NotForOneAsset {
+        /// Where.
+        at: Box<Location>,
+        /// Its path, without that of the table.
+        key: String,
+    },
+    /// An `[[asset]]` table for nobody.
+    #[error("{at}: an `[[asset]]` table says {} `glob` {} by `path` which meshes it is for", if *both { "both by" } else { "neither by" }, if *both { "and" } else { "nor" })]
+    NotOnePattern {
+        /// Where.
+        at: Box<Location>,
+        /// Whether there are two patterns, and not none.
+        both: bool,
+    },
     /// A value that the stage itself refuses.
     #[error("{at}: `{key}` is not usable: {reason}")]
     Refused {
@@ -220,6 +236,8 @@ impl ConfigError {
             | Self::WrongType { at, .. }
             | Self::UnknownChoice { at, .. }
             | Self::OutOfRange { at, .. }
+            | Self::NotForOneAsset { at, .. }
+            | Self::NotOnePattern { at, .. }
             | Self::Refused { at, .. } => Some(at),
         }
     }
@@ -250,6 +268,12 @@ impl ConfigError {
             Self::ListAndFile => "remove one of them".to_owned(),
             Self::PackedRectangles => {
                 "set `images.domain = \"flat\"`, or leave `patches.packed_side` out".to_owned()
+            }
+            Self::NotForOneAsset { .. } => {
+                "write it outside of the `[[asset]]` tables".to_owned()
+            }
+            Self::NotOnePattern { .. } => {
+                "give one of them, for example `glob = \"scans/*.ply\"`".to_owned()
             }
             Self::Syntax { .. } => {
                 "texts need quotes, lists need [ ], and each key stands once, on its own line"

@@ -139,6 +139,7 @@ const fn key(path: &'static str, kind: Kind, unit: &'static str, default: &'stat
     }
 }
 
+const ASSET_EXAMPLE: &str = "[{ glob = \"scans/*.ply\", flow.scheme = \"thurston\" }]";
 const CONE_EXAMPLE: &str = "[{ vertex = 0, curvature = \"1/2\" }]";
 const BOUNDARY_EXAMPLE: &str = "[{ vertex = 0, curvature = \"1/3\" }]";
 const CORNER_EXAMPLE: &str = "[{ vertex = 0 }, { vertex = 7 }, { vertex = 63 }, { vertex = 56 }]";
@@ -153,6 +154,9 @@ const VERTEX: Kind = Kind::Integer {
 /// Every key, in the order of `config.toml`.
 pub const KEYS: &[Key] = &[
     key("preset", Kind::Choice(presets::WORDS), "", "absent"),
+    key("asset", Kind::Tables(ASSET_EXAMPLE), "", "absent"),
+    key("asset[].glob", Kind::Text, "", "absent"),
+    key("asset[].path", Kind::Text, "", "absent"),
     key("input.paths", Kind::Texts, "", "[]"),
     key("output.folder", Kind::Text, "", "\"affine-atlas-out\""),
     key(
@@ -490,9 +494,42 @@ pub const KEYS: &[Key] = &[
         "500000",
     ),
     key(
+        "run.jobs",
+        Kind::Integer { min: 0, max: 1024 },
+        "meshes",
+        "0",
+    ),
+    key(
         "run.threads",
         Kind::Integer { min: 0, max: 1024 },
         "threads",
+        "0",
+    ),
+    key(
+        "run.timeout",
+        Kind::Integer {
+            min: 0,
+            max: 31_536_000,
+        },
+        "seconds",
+        "0",
+    ),
+    key(
+        "run.memory",
+        Kind::Integer {
+            min: 0,
+            max: 1 << 44,
+        },
+        "bytes",
+        "0",
+    ),
+    key(
+        "run.total_memory",
+        Kind::Integer {
+            min: 0,
+            max: 1 << 48,
+        },
+        "bytes",
         "0",
     ),
 ];

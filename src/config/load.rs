@@ -3,8 +3,8 @@
 use super::Config;
 use super::check::{Source, check};
 use super::error::{ConfigError, Location};
+use super::overrides::{self, Layers, Override};
 use super::presets::Preset;
-use crate::atlas::patches::Domain;
 use crate::flow::cones;
 use std::io::Read;
 use std::ops::Range;
@@ -26,6 +26,12 @@ pub struct Loaded {
     pub input_base: PathBuf,
     /// Folder that a relative `output.folder` starts from, by the same rule.
     pub output_base: PathBuf,
+    /// Files that were read: the configuration and cone files.
+    pub files: Vec<PathBuf>,
+    /// What `config` was made of.
+    layers: Layers,
+    /// Folder that a relative `cones.file` starts from, by the same rule.
+    cones_base: PathBuf,
 }
 
 impl Loaded {
@@ -33,6 +39,38 @@ impl Loaded {
     #[must_use]
     pub fn output_folder(&self) -> PathBuf {
         self.output_base.join(&self.config.output.folder)
+    }
+
+    /// The `[[asset]]` tables.
+    #[must_use]
+    pub fn overrides(&self) -> &[Override] {
+        &self.layers.overrides
+    }
+
+    /// Which of the `[[asset]]` tables are for a mesh, by the path that the user gave.
+    #[must_use]
+    pub fn overrides_for(&self, given: &Path) -> Vec<usize> {
+        let all = self.layers.overrides.iter().enumerate();
+        all.filter(|(_, one)| one.concerns(given))
+            .map(|(i, _)| i)
+            .collect()
+    }
+
+    /// The effective configuration of the meshes for which these of the `[[asset]]` tables are, cones of a cone file included.
+    /// What concerns the whole run is as in `config`.
+    ///
+    /// # Errors
+    /// As [`load`], where tables do not fit each other or the rest, or a cone file cannot be used.
+    pub fn config_with(&mut self, overrides: &[usize]) -> Result<Config, ConfigError> {
+        if overrides.is_empty() {
+            return Ok(self.config.clone());
+        }
+        let mut config = self.layers.config(overrides)?;
+        let cones = read_cones(&mut config, &self.cones_base)?;
+        self.files.extend(cones);
+        config.input = self.config.input.clone();
+        config.output = self.config.output.clone();
+        Ok(config)
     }
 }
 
@@ -44,7 +82,7 @@ impl Loaded {
 pub fn load(path: &Path, overrides: &[String]) -> Result<Loaded, ConfigError> {
     let text = read_text(path)?;
     let base = path.parent().unwrap_or(Path::new("")).to_owned();
-    let mut config = parse(&path.display().to_string(), &text, overrides)?;
+    let layers = parse_layers(&path.display().to_string(), &text, overrides)?;
     let set = |key: &str| overrides.iter().any(|given| override_key(given) == key);
     let base_of = |key: &str| {
         if set(key) {
@@ -53,12 +91,7 @@ pub fn load(path: &Path, overrides: &[String]) -> Result<Loaded, ConfigError> {
             base.clone()
         }
     };
-    read_cones(&mut config, &base_of("cones.file"))?;
-    Ok(Loaded {
-        input_base: base_of("input.paths"),
-        output_base: base_of("output.folder"),
-        config,
-    })
+    finish(layers, vec![path.to_owned()], base_of)
 }
 
 /// The defaults with overrides; every relative path starts at the current folder.
@@ -66,21 +99,34 @@ pub fn load(path: &Path, overrides: &[String]) -> Result<Loaded, ConfigError> {
 /// # Errors
 /// As [`load`], but for those of reading a configuration file.
 pub fn defaults(overrides: &[String]) -> Result<Loaded, ConfigError> {
-    let mut config = parse("defaults", "", overrides)?;
-    read_cones(&mut config, Path::new(""))?;
+    let layers = parse_layers("defaults", "", overrides)?;
+    finish(layers, Vec::new(), |_| PathBuf::new())
+}
+
+fn finish(
+    layers: Layers,
+    mut files: Vec<PathBuf>,
+    base_of: impl Fn(&str) -> PathBuf,
+) -> Result<Loaded, ConfigError> {
+    let mut config = layers.config(&[])?;
+    let cones_base = base_of("cones.file");
+    files.extend(read_cones(&mut config, &cones_base)?);
     Ok(Loaded {
-        input_base: PathBuf::new(),
-        output_base: PathBuf::new(),
+        input_base: base_of("input.paths"),
+        output_base: base_of("output.folder"),
         config,
+        files,
+        layers,
+        cones_base,
     })
 }
 
 /// Puts the cones of `cones.file` into `cones.list`, from where on they are like any others. `base` is what a relative
-/// path starts from.
-fn read_cones(config: &mut Config, base: &Path) -> Result<(), ConfigError> {
+/// path starts from. Gives the file that was read, where there is one.
+fn read_cones(config: &mut Config, base: &Path) -> Result<Option<PathBuf>, ConfigError> {
     let params = &mut config.cones;
     let Some(given) = &params.file else {
-        return Ok(());
+        return Ok(None);
     };
     if !params.list.is_empty() {
         return Err(ConfigError::ListAndFile);
@@ -105,37 +151,42 @@ fn read_cones(config: &mut Config, base: &Path) -> Result<(), ConfigError> {
         }
     })?;
     (params.file_lines, params.list) = cones.into_iter().unzip();
-    Ok(())
+    Ok(Some(path))
 }
 
-/// Parses a configuration text; `name` is what errors call it. An empty text gives the defaults. A cone file is not read.
+/// Parses a configuration text; `name` is what errors call it. An empty text gives the defaults. A cone file is not read, and `[[asset]]`
+/// tables are checked but are not in effect.
 ///
 /// # Errors
 /// As [`load`], but for those of reading a file.
 pub fn parse(name: &str, text: &str, overrides: &[String]) -> Result<Config, ConfigError> {
-    let file = Source {
-        name: name.to_owned(),
-        text: Arc::from(text),
+    parse_layers(name, text, overrides)?.config(&[])
+}
+
+/// Parses a configuration text and overrides, each checked by itself.
+pub(super) fn parse_layers(name: &str, text: &str, set: &[String]) -> Result<Layers, ConfigError> {
+    let file = Source::new(name, text);
+    let (table, tables) = parse_layer(&file)?;
+    let mut layers = Layers {
+        file: table,
+        set: toml::Table::new(),
+        overrides: tables.unwrap_or_default(),
+        last: Some(file),
     };
-    let mut own = parse_layer(&file)?;
-    let mut last = file;
-    for given in overrides {
-        last = override_source(given)?;
-        merge(&mut own, parse_layer(&last)?);
+    for given in set {
+        let source = override_source(given)?;
+        let (table, tables) = parse_layer(&source)?;
+        merge(&mut layers.set, table);
+        if let Some(tables) = tables {
+            layers.overrides = tables;
+        }
+        layers.last = Some(source);
     }
-    let mut merged = preset_layer(&own)?;
-    merge(&mut merged, own);
-    // Each layer was accepted alone and a key is replaced as a whole, so this can only fail where
-    // a stage relates several of its keys.
-    let config = Config::deserialize_table(merged).map_err(|error| refused(&last, &error))?;
-    match (config.images.domain, config.patches.packed_side) {
-        (Domain::Rectangle, Some(_)) => Err(ConfigError::PackedRectangles),
-        _ => Ok(config),
-    }
+    Ok(layers)
 }
 
 /// What the preset sets, if one is named: it lies below everything that the user wrote, wherever its name stands.
-fn preset_layer(own: &toml::Table) -> Result<toml::Table, ConfigError> {
+pub(super) fn preset_layer(own: &toml::Table) -> Result<toml::Table, ConfigError> {
     let Some(preset) = own.get("preset").cloned() else {
         return Ok(toml::Table::new());
     };
@@ -144,16 +195,7 @@ fn preset_layer(own: &toml::Table) -> Result<toml::Table, ConfigError> {
         // Each layer was accepted, so the word is known.
         Err(_) => "",
     };
-    parse_layer(&Source {
-        name: "preset".to_owned(),
-        text: Arc::from(text),
-    })
-}
-
-impl Config {
-    fn deserialize_table(table: toml::Table) -> Result<Self, toml::de::Error> {
-        toml::Value::Table(table).try_into()
-    }
+    Ok(parse_layer(&Source::new("preset", text))?.0)
 }
 
 fn read_text(path: &Path) -> Result<String, ConfigError> {
@@ -186,12 +228,14 @@ fn read_text(path: &Path) -> Result<String, ConfigError> {
     })
 }
 
-/// Checks one text by itself, so that every error has a place in it.
-fn parse_layer(source: &Source) -> Result<toml::Table, ConfigError> {
-    let table = DeTable::parse(&source.text).map_err(|error| syntax(source, &error))?;
-    check(source, table.get_ref())?;
+/// Checks one text by itself, so that every error has a place in it. Its `[[asset]]` tables are given apart.
+fn parse_layer(source: &Source) -> Result<(toml::Table, Option<Vec<Override>>), ConfigError> {
+    let checked = DeTable::parse(&source.text).map_err(|error| syntax(source, &error))?;
+    check(source, checked.get_ref())?;
     toml::from_str::<Config>(&source.text).map_err(|error| refused(source, &error))?;
-    toml::from_str(&source.text).map_err(|error| syntax(source, &error))
+    let mut table = toml::from_str(&source.text).map_err(|error| syntax(source, &error))?;
+    let overrides = overrides::take(source, checked.get_ref(), &mut table)?;
+    Ok((table, overrides))
 }
 
 fn syntax(source: &Source, error: &toml::de::Error) -> ConfigError {
@@ -207,7 +251,7 @@ fn syntax(source: &Source, error: &toml::de::Error) -> ConfigError {
     ConfigError::Syntax { at, reason }
 }
 
-fn refused(source: &Source, error: &toml::de::Error) -> ConfigError {
+pub(super) fn refused(source: &Source, error: &toml::de::Error) -> ConfigError {
     let span = error.span().unwrap_or(0..0);
     ConfigError::Refused {
         key: key_at(source, span.start).unwrap_or_else(|| "configuration".to_owned()),
@@ -259,14 +303,11 @@ fn override_source(given: &str) -> Result<Source, ConfigError> {
     } else {
         format!("{key} = {}", toml::Value::String(value.to_owned()))
     };
-    Ok(Source {
-        name: "--set".to_owned(),
-        text: Arc::from(text),
-    })
+    Ok(Source::new("--set", &text))
 }
 
 /// Later values replace earlier ones key by key; lists are replaced as a whole.
-fn merge(into: &mut toml::Table, from: toml::Table) {
+pub(super) fn merge(into: &mut toml::Table, from: toml::Table) {
     for (key, value) in from {
         match (into.get_mut(&key), value) {
             (Some(toml::Value::Table(old)), toml::Value::Table(new)) => merge(old, new),

@@ -13,15 +13,18 @@ mod check;
 pub mod error;
 pub mod keys;
 mod load;
+pub(crate) mod overrides;
 mod presets;
 mod sections;
 
 pub use error::{ConfigError, Location};
 pub use load::{Loaded, defaults, load, parse};
+pub use overrides::Override;
 pub use presets::Preset;
 pub use sections::*;
 
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// The commented configuration that `affine-atlas init` writes. It parses to
@@ -35,6 +38,10 @@ pub struct Config {
     /// Which preset gave defaults; its values are in the other fields already, so it is never written.
     #[serde(skip_serializing)]
     pub preset: Option<Preset>,
+    /// The `[[asset]]` tables as written; they are in effect through [`Loaded`] only, so this is empty in every configuration that
+    /// was loaded, and never written.
+    #[serde(skip_serializing)]
+    pub asset: Vec<toml::Table>,
     /// Which meshes.
     pub input: InputParams,
     /// Where the atlases go.
@@ -80,8 +87,30 @@ impl Config {
             output: OutputParams::default(),
             run: RunParams::default(),
             preset: None,
+            asset: Vec::new(),
             ..self.clone()
         }
+    }
+
+    /// [`Config::canonical`] as one value a key (`flow.scheme`), in order of the keys; lists are one value.
+    #[must_use]
+    pub fn flat(&self) -> BTreeMap<String, serde_json::Value> {
+        let mut flat = BTreeMap::new();
+        let mut pending = vec![(String::new(), serde_json::json!(self.canonical()))];
+        while let Some((path, value)) = pending.pop() {
+            match value {
+                serde_json::Value::Object(members) => {
+                    let dot = if path.is_empty() { "" } else { "." };
+                    let members = members.into_iter();
+                    pending
+                        .extend(members.map(|(name, value)| (format!("{path}{dot}{name}"), value)));
+                }
+                value => {
+                    flat.insert(path, value);
+                }
+            }
+        }
+        flat
     }
 
     /// BLAKE3 of [`Config::canonical`] as JSON, 64 hexadecimal digits (`source.config_blake3`).

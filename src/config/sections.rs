@@ -62,6 +62,14 @@ impl Default for PictureParams {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RunParams {
-    /// Threads for data-parallel loops; 0 takes one for each core.
+    /// Meshes that are built at the same time, each by a process of its own; 0: as many as there are cores.
+    pub jobs: usize,
+    /// Threads of each such process; 0: the cores, shared among them.
     pub threads: usize,
+    /// Most time that a mesh may take, seconds; 0: any.
+    pub timeout: u64,
+    /// Most memory that a mesh may take, bytes; 0: any.
+    pub memory: u64,
+    /// Memory of all processes together, bytes, within which jobs are started; 0: what is free when the run begins.
+    pub total_memory: u64,
 }

@@ -7,8 +7,8 @@ use crate::export::{Action, ExportError, folder};
 use crate::outcome::{AssetOutcome, AssetState, FailureKind};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fs;
-use std::io;
+use std::fs::{self, File};
+use std::io::{self, BufRead, BufReader, Write};
 use std::path::Path;
 
 /// Name of the file in the output root.
@@ -45,10 +45,16 @@ pub struct Record {
     pub error: Option<String>,
     /// Wall time, seconds.
     pub seconds: f64,
-    /// Peak memory of the process, bytes; absent where the system does not tell.
+    /// Peak memory of the asset's process, bytes; absent where the system does not tell, or nothing was computed.
     pub peak_memory: Option<u64>,
+    /// Name of the machine that did it, where it has one.
+    #[serde(default)]
+    pub host: Option<String>,
     /// Files of the asset, relative to the output root, ascending. After a failure those of the older result, if any.
     pub files: Vec<String>,
+    /// Whether nothing was built and `files` are those of an earlier run.
+    #[serde(default)]
+    pub kept: bool,
     /// One entry a component, in order; empty where the input could not be read.
     pub components: Vec<ComponentRecord>,
 }
@@ -86,28 +92,23 @@ impl Record {
             state: match (&outcome.state, failure) {
                 (AssetState::Cancelled, _) => State::Cancelled,
                 (_, Some(_)) => State::Failed,
+                (AssetState::Cached, None) => State::Cached,
                 _ => State::Built,
             },
             kind: failure.map(|f| f.kind),
             error: failure.map(|f| f.message.clone()),
             seconds: outcome.seconds,
-            peak_memory: peak_memory(),
+            peak_memory: outcome.peak_memory,
+            host: None,
             files: outcome
                 .files
                 .iter()
                 .map(|file| format!("{}/{file}", outcome.id))
                 .collect(),
+            kept: outcome.kept,
             components: components.collect(),
         }
     }
-}
-
-/// Most memory that this process has held so far, bytes, where the system tells (Linux).
-fn peak_memory() -> Option<u64> {
-    let status = fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    kibibytes.checked_mul(1024)
 }
 
 /// All records of an output root.
@@ -170,11 +171,86 @@ impl Manifest {
         text
     }
 
+    /// Puts records into the manifest of an output root in place of older ones of the same assets, and replaces the file in one
+    /// step. The older records are not held in memory, however many they are: their lines are copied, but for those that are no records.
+    pub fn update(output_root: &Path, newer: &BTreeMap<String, Record>) -> Result<(), ExportError> {
+        let path = output_root.join(FILE_NAME);
+        let older: Box<dyn BufRead> = match File::open(&path) {
+            Ok(file) => Box::new(BufReader::new(file)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Box::new(io::empty()),
+            Err(error) => return Err(ExportError::io(Action::Read, &path)(error)),
+        };
+        let mut sorted = true;
+        folder::stream_file_atomically(&path, |out| {
+            sorted = merge(older, newer, out)?;
+            match sorted {
+                true => Ok(()),
+                // Nothing is replaced.
+                false => Err(io::ErrorKind::InvalidData.into()),
+            }
+        })
+        .or_else(|error| match sorted {
+            true => Err(error),
+            false => {
+                let (mut manifest, _) = Manifest::load(output_root)?;
+                newer
+                    .values()
+                    .cloned()
+                    .for_each(|record| manifest.insert(record));
+                manifest.save(output_root)
+            }
+        })
+    }
+
     /// Replaces the file in one step.
     pub fn save(&self, output_root: &Path) -> Result<(), ExportError> {
         let path = output_root.join(FILE_NAME);
         folder::write_file_atomically(&path, self.to_text().as_bytes())
     }
+}
+
+/// The lines of both by id, newer ones in place of older. False where the older ones are not in order.
+fn merge(
+    older: impl BufRead,
+    newer: &BTreeMap<String, Record>,
+    out: &mut dyn Write,
+) -> io::Result<bool> {
+    #[derive(Deserialize)]
+    struct Named {
+        id: String,
+    }
+    let put = |out: &mut dyn Write, record: &Record| {
+        let mut record = record.clone();
+        if !record.seconds.is_finite() {
+            record.seconds = 0.0;
+        }
+        serde_json::to_writer(&mut *out, &record)?;
+        out.write_all(b"\n")
+    };
+    let mut newer = newer.iter().peekable();
+    let mut last: Option<String> = None;
+    for line in older.split(b'\n') {
+        let line = line?;
+        let Ok(Named { id }) = serde_json::from_slice(&line) else {
+            continue;
+        };
+        if last.as_ref().is_some_and(|last| *last >= id) {
+            return Ok(false);
+        }
+        while let Some((_, record)) = newer.next_if(|(newer, _)| **newer < id) {
+            put(out, record)?;
+        }
+        match newer.next_if(|(newer, _)| **newer == id) {
+            Some((_, record)) => put(out, record)?,
+            None => {
+                out.write_all(&line)?;
+                out.write_all(b"\n")?;
+            }
+        }
+        last = Some(id);
+    }
+    newer.try_for_each(|(_, record)| put(out, record))?;
+    Ok(true)
 }
 
 #[cfg(test)]
@@ -191,7 +267,9 @@ mod tests {
             error: (state == State::Failed).then(|| "raise the limit".into()),
             seconds: 0.1 + 0.2,
             peak_memory: Some(1 << 30),
+            host: Some("night-1".into()),
             files: vec![format!("{id}/atlas.json")],
+            kept: state == State::Failed,
             components: vec![ComponentRecord {
                 component: 0,
                 state,
@@ -237,6 +315,37 @@ mod tests {
         assert_eq!(manifest.get("spot").unwrap().state, State::Built);
         assert_eq!(manifest.get("spot").unwrap().seconds, 0.0);
         assert!(manifest.get("cow").is_none());
+    }
+
+    #[test]
+    fn updating_is_loading_inserting_and_saving() {
+        let root = tempfile::tempdir().unwrap();
+        let newer = |ids: &[&str]| -> BTreeMap<String, Record> {
+            let records = ids.iter().map(|&id| record(id, State::Built));
+            records.map(|r| (r.id.clone(), r)).collect()
+        };
+        let mut expected = Manifest::default();
+        for ids in [&["b", "d"][..], &["a", "c", "d", "e"], &[], &["c"]] {
+            let records = newer(ids);
+            Manifest::update(root.path(), &records).unwrap();
+            records.into_values().for_each(|r| expected.insert(r));
+            let text = fs::read_to_string(root.path().join(FILE_NAME)).unwrap();
+            assert_eq!(text, expected.to_text());
+        }
+        // Out of order, with lines that are none.
+        let mut lines: Vec<String> = expected.to_text().lines().map(str::to_owned).collect();
+        lines.reverse();
+        lines.insert(2, "garbage".into());
+        fs::write(root.path().join(FILE_NAME), lines.join("\n")).unwrap();
+        Manifest::update(root.path(), &newer(&["bb"])).unwrap();
+        expected.insert(record("bb", State::Built));
+        let text = fs::read_to_string(root.path().join(FILE_NAME)).unwrap();
+        assert_eq!(text, expected.to_text());
+        assert_eq!(
+            fs::read_dir(root.path()).unwrap().count(),
+            1,
+            "a temporary file stayed"
+        );
     }
 
     #[test]

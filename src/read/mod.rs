@@ -13,6 +13,7 @@
 //! | --- | --- |
 //! | `error` | what can be wrong with a file |
 //! | `folder` | which files may be read, how many bytes, and their hash |
+//! | `fingerprint` | hash of a file and all that it refers to, without decoding any |
 //! | `build` | the soup under construction and its limits |
 //! | `text` | lines, tokens and numbers of text formats |
 //! | `obj`, `off`, `ply`, `stl` | one format each |
@@ -30,6 +31,7 @@ pub(crate) mod bounded;
 mod build;
 mod error;
 pub(crate) mod exr;
+mod fingerprint;
 pub mod flat;
 mod folder;
 mod gltf;
@@ -42,6 +44,7 @@ mod stl;
 mod text;
 
 pub use error::{MeshoptError, Place, ReadError, ReadProblem};
+pub use fingerprint::{Fingerprint, fingerprint};
 
 use crate::geometry::mesh::Soup;
 use build::SoupBuilder;

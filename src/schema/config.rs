@@ -3,6 +3,7 @@
 use super::DRAFT;
 use crate::config::COMMENTED_DEFAULT;
 use crate::config::keys::{KEYS, Key, Kind};
+use crate::config::overrides::OF_THE_RUN;
 use serde_json::{Map, Value, json};
 
 /// A curvature as text: a number, a fraction, or an angle in radians.
@@ -22,9 +23,33 @@ pub fn config() -> Value {
             entry["description"] = words;
         }
     }
+    let settings = settings_of_assets(&root);
+    if let Some(Value::Object(entries)) = root.pointer_mut("/properties/asset/items/properties") {
+        entries.extend(settings);
+    }
     root["$schema"] = DRAFT.into();
     root["title"] = "config.toml of affine-atlas".into();
     root
+}
+
+/// What an `[[asset]]` table may hold beside what says for which meshes it is: all that does not concern the whole run.
+fn settings_of_assets(root: &Value) -> Map<String, Value> {
+    let mut settings = root["properties"].as_object().cloned().unwrap_or_default();
+    for path in OF_THE_RUN {
+        match path.split_once('.') {
+            None => {
+                settings.remove(path);
+            }
+            Some((section, key)) => {
+                let members = settings.get_mut(section);
+                let members = members.and_then(|s| s.get_mut("properties")?.as_object_mut());
+                if let Some(members) = members {
+                    members.remove(key);
+                }
+            }
+        }
+    }
+    settings
 }
 
 /// A table without keys that are not listed.
@@ -190,6 +215,24 @@ mod tests {
         );
         assert!(text("/properties/cones/description").starts_with("where the curvature goes"));
         assert!(text("/properties/run/description").contains("never changes a result"));
+    }
+
+    #[test]
+    fn tables_of_assets_hold_what_is_not_for_the_whole_run() {
+        let schema = config();
+        let table = &schema["properties"]["asset"]["items"]["properties"];
+        assert_eq!(table["flow"], schema["properties"]["flow"]);
+        assert_eq!(table["glob"]["type"], "string");
+        assert!(table["run"]["properties"]["memory"].is_object());
+        for pointer in [
+            "/asset",
+            "/input",
+            "/output",
+            "/run/properties/jobs",
+            "/run/properties/total_memory",
+        ] {
+            assert!(table.pointer(pointer).is_none(), "{pointer}");
+        }
     }
 
     #[test]

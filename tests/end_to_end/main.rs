@@ -20,4 +20,11 @@ mod survey;
 mod texture;
 
 /// Files of the run as a whole, beside the folders of assets.
-const OF_THE_RUN: [&str; 3] = ["manifest.jsonl", "index.html", "history.jsonl"];
+const OF_THE_RUN: [&str; 6] = [
+    "manifest.jsonl",
+    "index.html",
+    "history.jsonl",
+    "junit.xml",
+    "logs",
+    ".affine-atlas",
+];

@@ -18,7 +18,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Component, Path, PathBuf};
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
-use unfinished::{process_is_gone, remove_folder, replace, staging_name, sweep};
+use unfinished::{process_is_gone, remove_folder, replace, staging_name, sweep, unfinished_name};
 
 /// The folder of one component of an asset that has several.
 pub fn component_name(component: usize) -> String {
@@ -35,6 +35,12 @@ pub fn remove_all_staging() {
 /// folder that was set aside and not replaced goes back in place. Done once for each folder by [`Staging::begin`].
 pub fn sweep_stale(output_root: &Path) -> Result<(), ExportError> {
     sweep(output_root, &process_is_gone).map_err(ExportError::io(Action::Read, output_root))
+}
+
+/// Tells that [`sweep_stale`] was done in an output folder lately, so that [`Staging::begin`] leaves it out: a batch
+/// does it once for all its processes.
+pub fn mark_swept(output_root: &Path) {
+    REGISTRY.lock().swept.insert(output_root.to_owned());
 }
 
 /// All live staging folders of a process.
@@ -284,19 +290,55 @@ impl Seek for StagedFile {
     }
 }
 
+/// A name that no other process of any machine gives to a file, while this one runs.
+pub(crate) fn unique_name() -> String {
+    unfinished_name("", "")
+        .trim_start_matches(unfinished::PREFIX)
+        .trim_matches('-')
+        .to_owned()
+}
+
+/// Whether a process of this machine is known to have ended.
+pub(crate) fn process_has_ended(process: u32) -> bool {
+    process_is_gone(process)
+}
+
 /// Replaces a file in one step: a reader sees the old text or the new one. Used for the manifest.
 pub(crate) fn write_file_atomically(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
+    stream_file_atomically(path, |out| out.write_all(bytes))
+}
+
+/// The same for what is written bit by bit.
+pub(crate) fn stream_file_atomically(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), ExportError> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
     fs::create_dir_all(folder).map_err(ExportError::io(Action::CreateFolder, folder))?;
     let temporary = folder.join(staging_name());
     let written = (|| {
-        let mut file = File::create(&temporary)?;
-        file.write_all(bytes)?;
-        file.sync_all()?;
+        let mut file = BufWriter::new(File::create(&temporary)?);
+        write(&mut file)?;
+        file.flush()?;
+        file.get_ref().sync_all()?;
         fs::rename(&temporary, path)?;
         sync_folder(folder)
     })();
+    if written.is_err() {
+        let _ = fs::remove_file(&temporary);
+    }
+    written.map_err(ExportError::io(Action::Write, path))
+}
+
+/// The same without waiting for the disk, for files that say themselves whether they are whole: after a loss of power this one may be
+/// empty or cut.
+pub(crate) fn write_unsynced(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).map_err(ExportError::io(Action::CreateFolder, folder))?;
+    let temporary = folder.join(staging_name());
+    let written = fs::write(&temporary, bytes).and_then(|()| fs::rename(&temporary, path));
     if written.is_err() {
         let _ = fs::remove_file(&temporary);
     }
@@ -326,12 +368,21 @@ pub fn list_files(folder: &Path) -> Result<Vec<String>, ExportError> {
     Ok(files)
 }
 
+/// Names in the output root that are not those of assets.
+pub(crate) const RESERVED: [&str; 5] = [
+    index::FILE_NAME,
+    index::HISTORY_NAME,
+    "junit.xml",
+    "logs",
+    "manifest.jsonl",
+];
+
 /// The name, where it is one that a folder can have without meeting our own names.
 fn asset_name(name: &str) -> Result<&str, ExportError> {
     let bad = name.is_empty()
         || name.starts_with('.')
         || name.contains(['/', '\\', '\0'])
-        || ["manifest.jsonl", index::FILE_NAME, index::HISTORY_NAME].contains(&name);
+        || RESERVED.contains(&name);
     if bad {
         return Err(ExportError::AssetName { name: name.into() });
     }

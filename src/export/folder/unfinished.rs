@@ -50,7 +50,7 @@ pub(super) fn staging_name() -> String {
 }
 
 /// A hidden name that nothing else has: kind, machine, process and number, and which folder was set aside.
-fn unfinished_name(kind: &str, asset: &str) -> String {
+pub(super) fn unfinished_name(kind: &str, asset: &str) -> String {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let number = COUNT.fetch_add(1, Ordering::Relaxed);
     let process = std::process::id();
@@ -68,9 +68,18 @@ pub(super) static MACHINE: LazyLock<String> = LazyLock::new(|| {
     hasher.finalize().to_hex()[..8].to_owned()
 });
 
-/// True where a process of this machine is known to have ended. Without `/proc` nothing is known.
+/// True where a process of this machine is known to have ended, its parent's waiting aside. Without `/proc` nothing is known.
 pub(super) fn process_is_gone(process: u32) -> bool {
-    Path::new("/proc/self").exists() && !Path::new(&format!("/proc/{process}")).exists()
+    if !Path::new("/proc/self").exists() {
+        return false;
+    }
+    match fs::read_to_string(format!("/proc/{process}/stat")) {
+        // The state stands after the program's name, which may hold anything, also brackets.
+        Ok(stat) => stat
+            .rsplit_once(") ")
+            .is_some_and(|(_, rest)| rest.starts_with(['Z', 'X'])),
+        Err(error) => error.kind() == io::ErrorKind::NotFound,
+    }
 }
 
 /// See [`super::sweep_stale`]; `is_gone` tells whether a process has ended.

@@ -13,6 +13,8 @@ fn record(id: &str, state: State) -> Record {
         kind: failed.then_some(FailureKind::Prescription),
         error: failed.then(|| "the total is <b>4</b>, 2 & more".into()),
         seconds: 1.5,
+        host: None,
+        kept: false,
         peak_memory: Some(3 << 20),
         files: match failed {
             true => Vec::new(),

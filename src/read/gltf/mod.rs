@@ -25,6 +25,7 @@ use super::folder::Folder;
 use buffers::Buffers;
 use primitive::Plan;
 use schema::{Preamble, Root};
+use std::collections::BTreeSet;
 
 /// Extensions that change geometry and are understood.
 const GEOMETRY: [&str; 5] = [
@@ -119,4 +120,32 @@ fn check_extensions(preamble: &Preamble) -> Result<(), ReadProblem> {
         }
     }
     Ok(())
+}
+
+/// The files in the asset's folder that the JSON of a glTF file names, as relative paths: buffers and images. Names that
+/// reading refuses are left out, and where the JSON is broken there are none.
+pub(super) fn referenced_files(json: &[u8]) -> BTreeSet<String> {
+    #[derive(Default, serde::Deserialize)]
+    #[serde(default)]
+    struct Named {
+        uri: Option<String>,
+    }
+    #[derive(Default, serde::Deserialize)]
+    #[serde(default)]
+    struct Names {
+        buffers: Vec<Named>,
+        images: Vec<Named>,
+    }
+    let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
+    let end = json.iter().rposition(|&b| b != 0).map_or(0, |i| i + 1);
+    let names: Names = serde_json::from_slice(&json[..end]).unwrap_or_default();
+    let uris = names.buffers.into_iter().chain(names.images);
+    let external = |uri: &String| {
+        !uri.get(..5)
+            .is_some_and(|s| s.eq_ignore_ascii_case("data:"))
+    };
+    uris.filter_map(|named| named.uri)
+        .filter(external)
+        .filter_map(|uri| uri::relative_path(&uri).ok())
+        .collect()
 }

@@ -1,0 +1,419 @@
+//! From what the user names to files: globs, folders and list files.
+//!
+//! *Enters:* the entries of `input.paths` or the arguments. *Leaves:* one [`Input`] a mesh file, in the order of the entries, those of a
+//! folder or glob in order of their names. A file that is found twice is one input.
+//!
+//! | entry | means |
+//! | --- | --- |
+//! | `@list.txt` | the entries in a text file, one a line, which start at its folder; blank lines and lines that begin with `#` are skipped |
+//! | an existing file, or a name that is no glob | that file, whatever its extension |
+//! | an existing folder | every mesh file in it and in its subfolders, but for hidden ones |
+//! | a glob (`*`, `?`, `[a-z]`, `**`) | every mesh file that it matches |
+//!
+//! The output root is never searched. Links to folders are not followed, so that no search is without end.
+
+use crate::config::assets::Input;
+use crate::read::EXTENSIONS;
+use std::collections::HashSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What the entries mean.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Inputs {
+    /// The files.
+    pub files: Vec<Input>,
+    /// List files that were read.
+    pub lists: Vec<PathBuf>,
+    /// One sentence for each entry that nothing was found for, and each folder that could not be searched.
+    pub notes: Vec<String>,
+}
+
+/// Why entries have no meaning.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum InputError {
+    /// A list file that cannot be read.
+    #[error("the list {} cannot be read: {reason}", path.display())]
+    List {
+        /// Which.
+        path: PathBuf,
+        /// What the system said.
+        reason: String,
+    },
+    /// A list in a list.
+    #[error("line {line} of the list {} names another list", path.display())]
+    ListInList {
+        /// Which.
+        path: PathBuf,
+        /// From 1.
+        line: usize,
+    },
+    /// No glob.
+    #[error("`{glob}` is no glob: {reason}")]
+    Glob {
+        /// As given.
+        glob: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+}
+
+impl InputError {
+    /// What to change.
+    #[must_use]
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::List { .. } => {
+                "`@FILE` names a text file with a mesh, folder or glob on each line: check the name and that it is UTF-8 text"
+            }
+            Self::ListInList { .. } => "put its lines in place of its name",
+            Self::Glob { .. } => {
+                "`*` stands for any part of a name, `**` for any folders, `?` for one character, `[abc]` for one of these; write `[[]` for a bracket"
+            }
+        }
+    }
+}
+
+/// Finds the files. Relative entries start at `base`; `output` is not searched.
+///
+/// # Errors
+/// [`InputError`] for a list that cannot be read and a glob that is none.
+pub fn expand(entries: &[PathBuf], base: &Path, output: &Path) -> Result<Inputs, InputError> {
+    let mut search = Search {
+        output: output.canonicalize().ok(),
+        known: HashSet::new(),
+        inputs: Inputs::default(),
+    };
+    for entry in entries {
+        match entry.to_str().and_then(|text| text.strip_prefix('@')) {
+            Some(list) if !base.join(entry).exists() => search.list(Path::new(list), base)?,
+            _ => search.entry(entry, base, false)?,
+        }
+    }
+    Ok(search.inputs)
+}
+
+struct Search {
+    output: Option<PathBuf>,
+    known: HashSet<PathBuf>,
+    inputs: Inputs,
+}
+
+impl Search {
+    fn list(&mut self, list: &Path, base: &Path) -> Result<(), InputError> {
+        let path = base.join(list);
+        let unreadable = |reason: String| InputError::List {
+            path: path.clone(),
+            reason,
+        };
+        let bytes = fs::read(&path).map_err(|error| unreadable(error.to_string()))?;
+        let text = String::from_utf8(bytes).map_err(|error| {
+            unreadable(format!(
+                "byte {} is not UTF-8 text",
+                error.utf8_error().valid_up_to()
+            ))
+        })?;
+        let folder = list.parent().unwrap_or(Path::new(""));
+        for (number, line) in (1..).zip(text.lines()) {
+            let line = line.trim();
+            if line.is_empty() || line.starts_with('#') {
+                continue;
+            }
+            if line.starts_with('@') {
+                return Err(InputError::ListInList { path, line: number });
+            }
+            self.entry(&folder.join(line), base, true)?;
+        }
+        self.inputs.lists.push(path);
+        Ok(())
+    }
+
+    fn entry(&mut self, given: &Path, base: &Path, listed: bool) -> Result<(), InputError> {
+        let path = base.join(given);
+        if path.is_dir() {
+            let before = self.inputs.files.len();
+            self.folder(&path, given);
+            self.note_empty(before, given, "holds no mesh file");
+            return Ok(());
+        }
+        let is_glob = given
+            .to_str()
+            .is_some_and(|text| text.contains(['*', '?', '[']));
+        if is_glob && !path.exists() {
+            return self.glob(given, base);
+        }
+        // A file of a list is known by its place, like one that is found.
+        let below = (listed && given.is_relative()).then(|| given.to_owned());
+        self.put(path, given.to_owned(), below);
+        Ok(())
+    }
+
+    fn note_empty(&mut self, before: usize, given: &Path, what: &str) {
+        if self.inputs.files.len() == before {
+            let extensions = EXTENSIONS.join(", ");
+            let note = format!("{} {what} ({extensions})", given.display());
+            self.inputs.notes.push(note);
+        }
+    }
+
+    fn folder(&mut self, root: &Path, given: &Path) {
+        let mut pending = vec![PathBuf::new()];
+        let mut found = Vec::new();
+        while let Some(below) = pending.pop() {
+            let folder = root.join(&below);
+            if self.is_output(&folder) {
+                continue;
+            }
+            let entries = match fs::read_dir(&folder) {
+                Ok(entries) => entries,
+                Err(error) => {
+                    let note = format!("{} cannot be searched: {error}", folder.display());
+                    self.inputs.notes.push(note);
+                    continue;
+                }
+            };
+            for entry in entries.flatten() {
+                let name = entry.file_name();
+                if name.to_string_lossy().starts_with('.') {
+                    continue;
+                }
+                match entry.file_type() {
+                    Ok(kind) if kind.is_dir() => pending.push(below.join(name)),
+                    _ if is_mesh(Path::new(&name)) && entry.path().is_file() => {
+                        found.push(below.join(name))
+                    }
+                    _ => {}
+                }
+            }
+        }
+        found.sort();
+        for below in found {
+            self.put(root.join(&below), given.join(&below), Some(below));
+        }
+    }
+
+    fn glob(&mut self, given: &Path, base: &Path) -> Result<(), InputError> {
+        let refused = |reason: String| InputError::Glob {
+            glob: given.display().to_string(),
+            reason,
+        };
+        let text = given.to_string_lossy();
+        let start = match (given.is_absolute(), base.to_str()) {
+            (false, Some(base)) if !base.is_empty() => format!("{}/", glob::Pattern::escape(base)),
+            (false, None) => return Err(refused("its folder's name is not UTF-8 text".to_owned())),
+            _ => String::new(),
+        };
+        let options = glob::MatchOptions {
+            case_sensitive: true,
+            require_literal_separator: true,
+            require_literal_leading_dot: true,
+        };
+        let matches = glob::glob_with(&format!("{start}{text}"), options);
+        let matches = matches.map_err(|error| refused(error.msg.to_owned()))?;
+        let fixed = fixed_part(given);
+        let before = self.inputs.files.len();
+        for path in matches {
+            let path = match path {
+                Ok(path) => path,
+                Err(error) => {
+                    self.inputs.notes.push(error.to_string());
+                    continue;
+                }
+            };
+            if !is_mesh(&path)
+                || !path.is_file()
+                || path.parent().is_some_and(|p| self.inside_output(p))
+            {
+                continue;
+            }
+            let shown = path.strip_prefix(base).unwrap_or(&path).to_owned();
+            let below = shown.strip_prefix(&fixed).unwrap_or(&shown).to_owned();
+            self.put(path, shown, Some(below));
+        }
+        self.note_empty(before, given, "matches no mesh file");
+        Ok(())
+    }
+
+    fn put(&mut self, path: PathBuf, given: PathBuf, below: Option<PathBuf>) {
+        if self.known.insert(path.clone()) {
+            self.inputs.files.push(Input { path, given, below });
+        }
+    }
+
+    fn is_output(&self, folder: &Path) -> bool {
+        let same = |output: &PathBuf| folder.canonicalize().is_ok_and(|folder| folder == *output);
+        self.output.as_ref().is_some_and(same)
+    }
+
+    fn inside_output(&self, folder: &Path) -> bool {
+        let inside = |output: &PathBuf| {
+            folder
+                .canonicalize()
+                .is_ok_and(|folder| folder.starts_with(output))
+        };
+        self.output.as_ref().is_some_and(inside)
+    }
+}
+
+fn is_mesh(path: &Path) -> bool {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    extension.is_some_and(|extension| EXTENSIONS.contains(&extension.as_str()))
+}
+
+/// The folders of a glob before its first wildcard.
+fn fixed_part(glob: &Path) -> PathBuf {
+    let plain = |part: &std::path::Component<'_>| {
+        !part.as_os_str().to_string_lossy().contains(['*', '?', '['])
+    };
+    glob.components().take_while(plain).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tree(files: &[&str]) -> tempfile::TempDir {
+        let root = tempfile::tempdir().unwrap();
+        for file in files {
+            let path = root.path().join(file);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, "").unwrap();
+        }
+        root
+    }
+
+    fn found(root: &Path, entries: &[&str]) -> Vec<(String, Option<String>)> {
+        let entries: Vec<PathBuf> = entries.iter().map(PathBuf::from).collect();
+        let inputs = expand(&entries, root, &root.join("out")).unwrap();
+        let text = |path: &Path| path.to_str().unwrap().to_owned();
+        inputs
+            .files
+            .iter()
+            .map(|input| {
+                assert_eq!(input.path, root.join(&input.given));
+                (text(&input.given), input.below.as_deref().map(text))
+            })
+            .collect()
+    }
+
+    fn pair(given: &str, below: &str) -> (String, Option<String>) {
+        (given.to_owned(), Some(below.to_owned()))
+    }
+
+    const FILES: &[&str] = &[
+        "scans/b.PLY",
+        "scans/left/a.obj",
+        "scans/right/a.obj",
+        "scans/right/a.mtl",
+        "scans/.hidden/c.obj",
+        "scans/.d.obj",
+        "out/a/surface.glb",
+        "one.txt",
+    ];
+
+    #[test]
+    fn folders_are_searched_in_order_without_what_was_written() {
+        let root = tree(FILES);
+        let expected = [
+            pair("scans/b.PLY", "b.PLY"),
+            pair("scans/left/a.obj", "left/a.obj"),
+            pair("scans/right/a.obj", "right/a.obj"),
+        ];
+        assert_eq!(found(root.path(), &["scans"]), expected);
+        let all = found(root.path(), &["."]);
+        assert_eq!(all.len(), 3, "{all:?}");
+        assert_eq!(all[1], pair("./scans/left/a.obj", "scans/left/a.obj"));
+    }
+
+    #[test]
+    fn globs_match_whole_names() {
+        let root = tree(FILES);
+        assert_eq!(
+            found(root.path(), &["scans/*/a.*"]),
+            [
+                pair("scans/left/a.obj", "left/a.obj"),
+                pair("scans/right/a.obj", "right/a.obj")
+            ]
+        );
+        assert_eq!(found(root.path(), &["scans/*.obj"]), []);
+        assert_eq!(
+            found(root.path(), &["**/*.glb"]),
+            [],
+            "the output root was searched"
+        );
+        assert_eq!(
+            found(root.path(), &["**/?.PLY"]),
+            [pair("scans/b.PLY", "scans/b.PLY")]
+        );
+        let error = expand(&["a[".into()], root.path(), Path::new("out")).unwrap_err();
+        assert!(matches!(error, InputError::Glob { .. }), "{error}");
+    }
+
+    #[test]
+    fn files_are_taken_as_they_are() {
+        let root = tree(FILES);
+        let single = |name: &str| (name.to_owned(), None);
+        assert_eq!(
+            found(
+                root.path(),
+                &["one.txt", "none.obj", "scans/left/a.obj", "scans/left"]
+            ),
+            [
+                single("one.txt"),
+                single("none.obj"),
+                single("scans/left/a.obj")
+            ]
+        );
+        fs::write(root.path().join("a[1].obj"), "").unwrap();
+        assert_eq!(found(root.path(), &["a[1].obj"]), [single("a[1].obj")]);
+    }
+
+    #[test]
+    fn lists_start_at_their_folder() {
+        let root = tree(FILES);
+        let list = root.path().join("scans/list.txt");
+        fs::write(
+            &list,
+            "# tonight\n\n left/a.obj \nright\n*.PLY\nmissing.obj\n",
+        )
+        .unwrap();
+        assert_eq!(
+            found(root.path(), &["@scans/list.txt"]),
+            [
+                pair("scans/left/a.obj", "scans/left/a.obj"),
+                pair("scans/right/a.obj", "a.obj"),
+                pair("scans/b.PLY", "b.PLY"),
+                pair("scans/missing.obj", "scans/missing.obj"),
+            ]
+        );
+        fs::write(&list, "left/a.obj\n@other\n").unwrap();
+        let entry = [PathBuf::from("@scans/list.txt")];
+        let error = expand(&entry, root.path(), Path::new("out")).unwrap_err();
+        assert!(
+            error.to_string().starts_with("line 2 of the list"),
+            "{error}"
+        );
+        fs::write(&list, b"\xff").unwrap();
+        let error = expand(&entry, root.path(), Path::new("out")).unwrap_err();
+        assert!(
+            error.to_string().ends_with("byte 0 is not UTF-8 text"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn what_finds_nothing_is_said() {
+        let root = tree(FILES);
+        fs::create_dir(root.path().join("empty")).unwrap();
+        let entries = ["empty".into(), "scans/*.stl".into()];
+        let inputs = expand(&entries, root.path(), Path::new("out")).unwrap();
+        assert!(inputs.files.is_empty());
+        assert_eq!(
+            inputs.notes,
+            [
+                "empty holds no mesh file (gltf, glb, obj, ply, stl, off)",
+                "scans/*.stl matches no mesh file (gltf, glb, obj, ply, stl, off)"
+            ]
+        );
+    }
+}
