@@ -581,9 +581,10 @@ fn help() {
       affine-atlas build --dry-run                    what would be built, and why
 
     Each mesh becomes a folder OUT/NAME with atlas.json, atlas.npz, surface.glb, images/, pictures and
-    report.html. It appears when it is complete; an older good folder stays if the build fails. Where mesh,
-    settings and version are the same as last time and the folder is whole, nothing is built. OUT also gets
-    manifest.jsonl and junit.xml (what became of each mesh), index.html (the same to look at) and logs/NAME.log.
+    report.html. It appears when it is complete; an older good folder stays if the build fails. Where
+    mesh, settings and version are the same as last time and the folder is whole, nothing is built. OUT
+    also gets manifest.jsonl and junit.xml (what became of each mesh), index.html (the same to look at)
+    and logs/NAME.log.
     ");
     insta::assert_snapshot!(stdout(&run(folder.path(), &["cones", "-h"])), @r"
     Show what more or fewer cones gain, and write lists of them

@@ -205,6 +205,8 @@ fn configurations_are_valid_and_broken_ones_are_not() {
         "preset = \"texture\"\n[cones]\nlist = [{ vertex = 0, curvature = \"1.5708 rad\" }, { point = [0.0, 1, -2], curvature = -0.5 }]\nquantum = \"1/2\"\n[boundary]\ntotals = [\"-8\", 2]\n[repair]\nweld_tolerance = 0.0\n",
     );
     assert_valid(&config, &listed, "listed cones");
+    let some = "[[asset]]\nglob = \"*.ply\"\nflow.scheme = \"thurston\"\nrun.memory = 1000000000\n";
+    assert_valid(&config, &read(some), "settings of some meshes");
     assert_refused(
         &config,
         &good,
@@ -221,6 +223,15 @@ fn configurations_are_valid_and_broken_ones_are_not() {
             ("/cones/list", Some(json!([{ "curvature": "half" }]))),
             ("/cones/max_curvature", Some(json!(2))),
             ("/run/threads", Some(json!(0.5))),
+            (
+                "/asset",
+                Some(json!([{ "glob": "*.ply", "flow": { "scheme": "tangent" } }])),
+            ),
+            (
+                "/asset",
+                Some(json!([{ "glob": "*.ply", "run": { "jobs": 2 } }])),
+            ),
+            ("/asset", Some(json!([{ "glob": "*.ply", "output": {} }]))),
         ],
     );
 }
