@@ -2,6 +2,7 @@
 
 use super::changes::{Change, Changes, WORSE_BY, WORSE_FACTOR};
 use super::figures::Asset;
+use crate::export::folder::component_name;
 use crate::export::html::{self, escape, figure, link};
 use crate::export::manifest::State;
 use crate::export::report;
@@ -96,10 +97,10 @@ fn linked(asset: &Asset<'_>) -> String {
     let reports: Vec<&String> = (asset.record.files.iter())
         .filter(|file| file.ends_with(&ending))
         .collect();
-    for (i, file) in reports.iter().take(REPORTS).enumerate() {
-        let words = match reports.len() {
-            1 => "report".to_owned(),
-            _ => format!("report {i}"),
+    for file in reports.iter().take(REPORTS) {
+        let words = match component(file) {
+            Some(number) => format!("report {number}"),
+            None => "report".to_owned(),
         };
         let _ = write!(out, " · <a href=\"{}\">{words}</a>", link(file));
     }
@@ -107,6 +108,14 @@ fn linked(asset: &Asset<'_>) -> String {
         let _ = write!(out, " · {} more", reports.len() - REPORTS);
     }
     out
+}
+
+/// The number of the component whose folder a file lies in, where an asset has several.
+fn component(file: &str) -> Option<usize> {
+    let (folder, _) = file.rsplit_once('/')?;
+    let (_, name) = folder.rsplit_once('/')?;
+    let number = name.rsplit_once('-')?.1.parse().ok()?;
+    (name == component_name(number)).then_some(number)
 }
 
 fn sentence(asset: &Asset<'_>) -> String {
@@ -300,4 +309,19 @@ fn row(body: &mut String, asset: &Asset<'_>, change: Option<Change>) {
     number(of.and_then(|f| f.image_psnr_db), &|x| format!("{x:.1}"));
     let kind = record.kind.map_or("", |kind| kind.name());
     let _ = writeln!(body, "<td>{kind}</td></tr>");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reports_have_the_numbers_of_their_components() {
+        assert_eq!(component("spot/report.html"), None);
+        assert_eq!(component("spot/component-002/report.html"), Some(2));
+        assert_eq!(component("spot/component-1000/report.html"), Some(1000));
+        // Assets may have such names.
+        assert_eq!(component("component-002/report.html"), None);
+        assert_eq!(component("spot/component-2/report.html"), None);
+    }
 }
