@@ -18,7 +18,6 @@ use super::disk::Disk;
 use super::division::{cross, draw, joining, part, places, regions};
 use super::sides::{Drawing, Role};
 use crate::geometry::ids::{FaceId, VertexId, VertexVec};
-use rustc_hash::FxHashMap;
 
 /// A four-sided part of a patch.
 pub(super) struct Quad {
@@ -26,14 +25,11 @@ pub(super) struct Quad {
     pub disk: Disk,
     /// Places of its corners on the disk's border, in the order of the border.
     pub corners: [usize; 4],
-    /// Which region between the walls it is a part of, in the order of their first faces.
-    pub region: usize,
 }
 
 /// Divides all regions between walls; walls are drawn between quads. In the order of their first faces.
 pub(super) fn quads(drawing: &mut Drawing) -> Result<Vec<Quad>, RectangleError> {
-    let mut region_of_centre = FxHashMap::default();
-    for (region, start) in regions(drawing).into_iter().enumerate() {
+    for start in regions(drawing) {
         let disk = part(drawing, start)?;
         let nodes: Vec<usize> = places(drawing, &disk, |role| role == Role::Node).collect();
         let middles: Vec<usize> = places(drawing, &disk, |role| role == Role::Middle).collect();
@@ -42,25 +38,18 @@ pub(super) fn quads(drawing: &mut Drawing) -> Result<Vec<Quad>, RectangleError> 
                 what: "the sides of a patch",
             });
         }
-        let centre = star(drawing, disk, &middles, &nodes)?;
-        region_of_centre.insert(centre, region);
+        star(drawing, disk, &middles, &nodes)?;
     }
     // Splits may have moved halfedges of parts that were finished: taken out at the end.
     let quad = |start| {
         let disk = part(drawing, start)?;
-        let error = || RectangleError::Inconsistent {
-            what: "the corners of a quad",
-        };
         let corners: Vec<usize> = places(drawing, &disk, |role| role != Role::Plain).collect();
-        let corners: [usize; 4] = corners.try_into().map_err(|_| error())?;
-        let centre = corners.map(|place| disk.border_vertex(place));
-        let mut region = centre.iter().filter_map(|v| region_of_centre.get(v));
-        let region = *region.next().ok_or_else(error)?;
-        Ok(Quad {
-            disk,
-            corners,
-            region,
-        })
+        let corners = corners
+            .try_into()
+            .map_err(|_| RectangleError::Inconsistent {
+                what: "the corners of a quad",
+            })?;
+        Ok(Quad { disk, corners })
     };
     regions(drawing).into_iter().map(quad).collect()
 }

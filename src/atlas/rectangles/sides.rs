@@ -37,7 +37,6 @@ pub(super) enum Role {
 }
 
 /// A surface on which walls are drawn.
-#[derive(Clone)]
 pub(super) struct Drawing {
     pub fine: Subdivision,
     /// Patch of every face of the surface.

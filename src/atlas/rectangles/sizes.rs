@@ -5,7 +5,6 @@
 //! Strips of rectangles wander over the whole surface, so nearly all rectangles have as many samples: how densely a place is sampled is decided by how large the
 //! rectangles there are. A patch of n sides becomes n of them; with area A its texels are √(A / n) long, in some unit, and its squared error is about b (A / n)^{3/2}, where b is the bend of
 //! its edges (θ² L, as in `patches::demand`). Each division makes some rectangles more, with fewer texels for all others. It is made where the sum of errors falls by it.
-//! When there are rectangles, their images tell the errors better, which may be much larger where a map is crowded.
 
 use super::RectangleError;
 use super::division::{best_line, draw_between, part, places, regions};
@@ -35,7 +34,7 @@ struct Size {
     divided: f64,
 }
 
-/// Divides until nothing is gained, as far as areas and bends tell.
+/// Divides until nothing is gained.
 pub(super) fn divide(drawing: &mut Drawing, budget: usize) -> Result<(), RectangleError> {
     let floor = FLOOR * mean_bend(drawing);
     for _ in 0..ROUNDS {
@@ -43,72 +42,40 @@ pub(super) fn divide(drawing: &mut Drawing, budget: usize) -> Result<(), Rectang
             .into_iter()
             .map(|start| size(drawing, start, floor))
             .collect::<Result<_, _>>()?;
-        if draw(drawing, &sizes, budget, 3)? == 0 {
+        let quads: f64 = sizes.iter().map(|s| s.sides).sum();
+        let error: f64 = sizes.iter().map(|s| s.error).sum();
+        let before = total(error, quads, budget);
+        let gain = |s: &Size| {
+            let after = total(error - s.error + s.divided, quads + ADDED, budget);
+            // Rounded: the last digits must not decide.
+            let gain = (10.0 * (before / after).log10() * 1e6).round() / 1e6;
+            if gain.is_finite() { gain } else { 0.0 }
+        };
+        let best = sizes.iter().map(gain).fold(0.0, f64::max);
+        let mut drawn = 0;
+        for size in sizes
+            .iter()
+            .filter(|s| gain(s) >= (SHARE * best).max(LEAST_GAIN))
+        {
+            let mut disk = part(drawing, size.start)?;
+            let first = places(drawing, &disk, |role| role == Role::Node).next();
+            disk.border.rotate_left(first.unwrap_or(0));
+            if let Some(line) = best_line(drawing, &disk, true)? {
+                draw_between(drawing, &disk, line)?;
+                drawn += 1;
+            }
+        }
+        if drawn == 0 {
             break;
         }
     }
     Ok(())
 }
 
-/// Divides once where images of rectangles turned out to be worst for their texels. `measured` is the squared error of every region, by a face of it, if its rectangles had
-/// one texel each; with k times as many along a side, it is k⁴ times smaller. How many lines were drawn.
-pub(super) fn divide_measured(
-    drawing: &mut Drawing,
-    measured: &[(FaceId, f64)],
-    budget: usize,
-) -> Result<usize, RectangleError> {
-    let floor = FLOOR * mean_bend(drawing);
-    let sizes = measured.iter().map(|&(start, error)| {
-        let modelled = size(drawing, start, floor)?;
-        // The model is one of h³, and this is h⁴.
-        let part = (modelled.divided / modelled.error).powf(4.0 / 3.0);
-        let part = if part.is_finite() { part } else { 1.0 };
-        Ok(Size {
-            error,
-            divided: error * part,
-            ..modelled
-        })
-    });
-    let sizes: Vec<Size> = sizes.collect::<Result<_, RectangleError>>()?;
-    draw(drawing, &sizes, budget, 4)
-}
-
-/// Draws the lines that gain most. With k times as many texels along a side errors are k^`order` times smaller.
-fn draw(
-    drawing: &mut Drawing,
-    sizes: &[Size],
-    budget: usize,
-    order: i32,
-) -> Result<usize, RectangleError> {
-    let quads: f64 = sizes.iter().map(|s| s.sides).sum();
-    let error: f64 = sizes.iter().map(|s| s.error).sum();
-    // One row and column of each image lie on its border twice.
-    let total = |error: f64, quads: f64| {
-        let samples = (budget as f64 / quads).sqrt();
-        error / (samples - 1.0).max(1.0).powi(order)
-    };
-    let before = total(error, quads);
-    let gain = |s: &Size| {
-        let after = total(error - s.error + s.divided, quads + ADDED);
-        // Rounded: the last digits must not decide.
-        let gain = (10.0 * (before / after).log10() * 1e6).round() / 1e6;
-        if gain.is_finite() { gain } else { 0.0 }
-    };
-    let best = sizes.iter().map(gain).fold(0.0, f64::max);
-    let mut drawn = 0;
-    for size in sizes
-        .iter()
-        .filter(|s| gain(s) >= (SHARE * best).max(LEAST_GAIN))
-    {
-        let mut disk = part(drawing, size.start)?;
-        let first = places(drawing, &disk, |role| role == Role::Node).next();
-        disk.border.rotate_left(first.unwrap_or(0));
-        if let Some(line) = best_line(drawing, &disk, true)? {
-            draw_between(drawing, &disk, line)?;
-            drawn += 1;
-        }
-    }
-    Ok(drawn)
+/// Squared error of rectangles that have equal shares of a budget. One row and column of each lie on its border twice.
+fn total(error: f64, quads: f64, budget: usize) -> f64 {
+    let samples = (budget as f64 / quads).sqrt();
+    error / (samples - 1.0).max(1.0).powi(3)
 }
 
 fn mean_bend(drawing: &Drawing) -> f64 {

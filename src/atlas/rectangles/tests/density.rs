@@ -1,12 +1,7 @@
-//! More samples where the surface bends, and walls where images turn out worst.
+//! More samples where the surface bends.
 
-use super::super::attempt::{self, Attempt};
 use super::super::density::density;
-use super::super::division::{part, places, regions};
-use super::super::sides::Role;
-use super::super::{finish, sizes};
 use super::*;
-use crate::atlas::patches::PatchParams;
 
 /// Faces on one side of a plane bend a hundred times as much.
 fn bends(fine: &Subdivision) -> FaceVec<f64> {
@@ -75,81 +70,4 @@ fn what_bends_gets_more_texels() {
         }
     }
     assert!(divided >= 4, "{divided}");
-}
-
-/// A sheet of even squares with a narrow bump, in nine patches: what they are off by is far from even.
-fn bump() -> Drawing {
-    let squares = (0..36 * 36).map(|i| [i % 36, i / 36, 0]);
-    let mut mesh = polycube(squares, |_, axis, sign| axis == 2 && sign == 1);
-    for p in mesh.positions.as_mut_slice() {
-        let away = (p[0] - 17.3).powi(2) + (p[1] - 18.9).powi(2);
-        p[2] += 4.0 * (-away / 8.0).exp();
-    }
-    let c = &mesh.connectivity;
-    let patch = |f| {
-        let p = mesh.face_positions(f);
-        let [x, y] = [0, 1].map(|i| ((p[0][i] + p[1][i] + p[2][i]) / 36.0) as usize);
-        PatchId::new(3 * y.min(2) + x.min(2))
-    };
-    let face_patch: FaceVec<PatchId> = c.faces().map(patch).collect();
-    let is_cut = crate::geometry::ids::EdgeVec::filled(false, c.edge_count());
-    let mut drawing = Drawing::new(&mesh, &is_cut, &face_patch).unwrap();
-    finish(&mut drawing).unwrap();
-    drawing
-}
-
-#[test]
-fn the_worst_region_is_divided() {
-    let drawing = bump();
-    let starts = regions(&drawing);
-    assert_eq!(starts.len(), 9);
-    let faces = |drawing: &Drawing, start| part(drawing, start).unwrap().faces.len();
-    let mut divisible = 0;
-    for worst in 0..starts.len() {
-        let errors = (0..starts.len()).map(|i| if i == worst { 1e3 } else { 1.0 });
-        let measured: Vec<_> = starts.iter().copied().zip(errors).collect();
-        let mut divided = drawing.clone();
-        let drawn = sizes::divide_measured(&mut divided, &measured, 40_000).unwrap();
-        // A line leaves four sides on both sides of it, which three have no room for.
-        let disk = part(&drawing, starts[worst]).unwrap();
-        if places(&drawing, &disk, |role| role == Role::Node).count() < 4 {
-            assert_eq!(drawn, 0);
-            continue;
-        }
-        divisible += 1;
-        assert_eq!(drawn, 1);
-        assert_eq!(regions(&divided).len(), starts.len() + 1);
-        // What the line crosses is split, and no other region gets a face more but its neighbours where the line ends.
-        let most = (0..starts.len())
-            .max_by_key(|&i| faces(&drawing, starts[i]).saturating_sub(faces(&divided, starts[i])));
-        assert_eq!(most, Some(worst));
-    }
-    // Where nothing is off there is nothing to gain.
-    let exact: Vec<_> = starts.iter().map(|&f| (f, 0.0)).collect();
-    let mut same = drawing.clone();
-    assert_eq!(
-        sizes::divide_measured(&mut same, &exact, 40_000).unwrap(),
-        0
-    );
-    assert!(divisible >= 5, "{divisible}");
-}
-
-#[test]
-fn further_walls_are_kept_only_where_they_help() {
-    let params = PatchParams {
-        texel_budget: 40_000,
-        ..PatchParams::default()
-    };
-    let first = Attempt::new(bump(), &params, TOLERANCE).unwrap();
-    let best = attempt::best(bump(), &params, TOLERANCE).unwrap();
-    assert!(
-        best.error < 0.95 * first.error,
-        "{} {}",
-        best.error,
-        first.error
-    );
-    assert!(best.rectangles.len() > first.rectangles.len());
-    let texels: usize = best.samples.iter().map(|[m, n]| m * n).sum();
-    assert!(texels <= params.texel_budget);
-    assert_eq!(best.samples.len(), best.rectangles.len());
 }
