@@ -38,6 +38,9 @@ const TANGENTIAL: &[&str] = &["flow.scheme=tangential"];
 /// The tutorial's own scheme.
 const THURSTON: &[&str] = &["flow.scheme=thurston"];
 
+/// Four-sided patches, each mapped to a rectangle: other walls, so another overlay, than in the flat metric's own grid.
+const RECTANGLES: &[&str] = &["images.domain=rectangle"];
+
 /// What is done with the corpus' folder.
 type Case = Box<dyn FnOnce(&Path) -> Result<(), Failed> + Send>;
 
@@ -54,7 +57,11 @@ fn main() {
         trials.push(trial.with_ignored_flag(corpus.is_none()));
     };
     for (file, genus, loops) in CLEAN {
-        for (name, settings) in [("clean", DEFAULTS), ("tangential", TANGENTIAL)] {
+        for (name, settings) in [
+            ("clean", DEFAULTS),
+            ("tangential", TANGENTIAL),
+            ("rectangle", RECTANGLES),
+        ] {
             let run = move |corpus: &Path| clean(&corpus.join(file), genus, loops, settings);
             add(format!("{name}/{file}"), Box::new(run));
         }
