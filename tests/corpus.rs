@@ -4,31 +4,12 @@
 //! reported as ignored. `AFFINE_ATLAS_CHECKER` names an independent checker of output folders (a
 //! Python script, run by `AFFINE_ATLAS_PYTHON` or `python3`); without it only the program's own `verify` is asked.
 
+mod real_models;
+
 use libtest_mimic::{Arguments, Failed, Trial};
+use real_models::{CLEAN, checked, comparable, succeed};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-
-/// File, genus, boundary loops.
-const CLEAN: [(&str, usize, usize); 18] = [
-    ("spot.obj", 0, 0),
-    ("bunny-closed.off", 0, 0),
-    ("nefertiti.obj", 0, 0),
-    ("fandisk.off", 0, 0),
-    ("bumpy-cube.obj", 0, 0),
-    ("rocker-arm.obj", 1, 0),
-    ("kitten.obj", 1, 0),
-    ("brezel.obj", 2, 0),
-    ("three-holes.off", 3, 0),
-    ("elephant-genus3.obj", 3, 0),
-    ("fertility.off", 4, 0),
-    ("face.obj", 0, 1),
-    ("camelhead.off", 0, 1),
-    ("lilium.obj", 0, 1),
-    ("lego.ply", 0, 1),
-    ("punctured-torus.obj", 1, 1),
-    ("stanford-bunny.obj", 0, 5),
-    ("beetle.obj", 0, 11),
-];
 
 /// Vertex scaling with flips, cones chosen automatically.
 const DEFAULTS: &[&str] = &[];
@@ -37,9 +18,6 @@ const TANGENTIAL: &[&str] = &["flow.scheme=tangential"];
 
 /// The tutorial's own scheme.
 const THURSTON: &[&str] = &["flow.scheme=thurston"];
-
-/// Four-sided patches, each mapped to a rectangle: other walls, so another overlay, than in the flat metric's own grid.
-const RECTANGLES: &[&str] = &["images.domain=rectangle"];
 
 /// What is done with the corpus' folder.
 type Case = Box<dyn FnOnce(&Path) -> Result<(), Failed> + Send>;
@@ -57,11 +35,7 @@ fn main() {
         trials.push(trial.with_ignored_flag(corpus.is_none()));
     };
     for (file, genus, loops) in CLEAN {
-        for (name, settings) in [
-            ("clean", DEFAULTS),
-            ("tangential", TANGENTIAL),
-            ("rectangle", RECTANGLES),
-        ] {
+        for (name, settings) in [("clean", DEFAULTS), ("tangential", TANGENTIAL)] {
             let run = move |corpus: &Path| clean(&corpus.join(file), genus, loops, settings);
             add(format!("{name}/{file}"), Box::new(run));
         }
@@ -166,34 +140,8 @@ fn build_one(
 
 /// Asks the program and, where there is one, the independent checker.
 fn verify(atlas: &Path, source: Option<&Path>, cones: Option<usize>) -> Result<(), Failed> {
-    let own = program().arg("verify").arg(atlas).output()?;
-    if !own.status.success() {
-        return Err(failures("verify", &own).into());
-    }
-    let Some(checker) = std::env::var_os("AFFINE_ATLAS_CHECKER") else {
-        return Ok(());
-    };
-    let python = std::env::var_os("AFFINE_ATLAS_PYTHON").unwrap_or_else(|| "python3".into());
-    let mut command = Command::new(python);
-    command.arg(checker).arg(atlas);
-    if let Some(source) = source {
-        command.arg("--source").arg(source);
-    }
-    if let Some(cones) = cones {
-        command.arg("--cones").arg(cones.to_string());
-    }
-    let output = command.output()?;
-    if output.status.success() {
-        Ok(())
-    } else {
-        Err(failures("checker", &output).into())
-    }
-}
-
-fn failures(who: &str, output: &Output) -> String {
-    let lines = text(&output.stdout);
-    let failed: Vec<&str> = lines.lines().filter(|l| l.starts_with("FAIL")).collect();
-    format!("{who}: {}\n{}", failed.join("\n"), text(&output.stderr))
+    succeed("verify", program().arg("verify").arg(atlas))?;
+    Ok(checked(atlas, source, cones)?)
 }
 
 fn max_error(json: &serde_json::Value) -> f64 {
@@ -214,10 +162,7 @@ fn clean(model: &Path, genus: usize, loops: usize, settings: &[&str]) -> Result<
     if cones > 8 {
         return Err(format!("{cones} cones by default").into());
     }
-    // The checker compares with the source of OBJ and OFF files only.
-    let extension = model.extension();
-    let comparable = extension.is_some_and(|e| e == "obj" || e == "off");
-    verify(&atlas, comparable.then_some(model), Some(cones))
+    verify(&atlas, comparable(model), Some(cones))
 }
 
 /// Fig. 8, 20 and 21: all curvature at one vertex.

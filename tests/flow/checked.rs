@@ -2,8 +2,9 @@
 
 use crate::models::Model;
 use crate::prescriptions;
+use crate::real_models::{checked, comparable, succeed};
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 
 /// The first of the random prescriptions of a model.
 pub fn first_prescription(file: &Path) -> Result<(), String> {
@@ -54,35 +55,9 @@ fn build_and_check(file: &Path, settings: &[&str], cones: usize) -> Result<(), S
         return Err(format!("curvature error {error:?}"));
     }
     succeed("verify", program().arg("verify").arg(&atlas))?;
-    let Some(checker) = std::env::var_os("AFFINE_ATLAS_CHECKER") else {
-        return Ok(());
-    };
-    let python = std::env::var_os("AFFINE_ATLAS_PYTHON").unwrap_or_else(|| "python3".into());
-    let mut command = Command::new(python);
-    command.arg(checker).arg(&atlas);
-    command.arg("--cones").arg(cones.to_string());
-    // The checker compares with the source of OBJ and OFF files only.
-    if file.extension().is_some_and(|e| e == "obj" || e == "off") {
-        command.arg("--source").arg(file);
-    }
-    succeed("checker", &mut command)
+    checked(&atlas, comparable(file), Some(cones))
 }
 
 fn program() -> Command {
     Command::new(env!("CARGO_BIN_EXE_affine-atlas"))
-}
-
-fn succeed(who: &str, command: &mut Command) -> Result<(), String> {
-    let Output {
-        status,
-        stdout,
-        stderr,
-    } = command.output().map_err(|e| e.to_string())?;
-    if status.success() {
-        return Ok(());
-    }
-    let said = String::from_utf8_lossy(&stdout);
-    let failed: Vec<&str> = said.lines().filter(|l| l.starts_with("FAIL")).collect();
-    let stderr = String::from_utf8_lossy(&stderr);
-    Err(format!("{who}: {}\n{stderr}", failed.join("\n")))
 }

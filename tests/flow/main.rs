@@ -7,34 +7,15 @@ mod checked;
 mod invariance;
 mod models;
 mod prescriptions;
+#[path = "../real_models/mod.rs"]
+mod real_models;
 mod reference;
 mod refinement;
 mod stress;
 
 use libtest_mimic::{Arguments, Failed, Trial};
+use real_models::CLEAN;
 use std::path::PathBuf;
-
-/// The clean models.
-const MODELS: [&str; 18] = [
-    "spot.obj",
-    "bunny-closed.off",
-    "nefertiti.obj",
-    "fandisk.off",
-    "bumpy-cube.obj",
-    "rocker-arm.obj",
-    "kitten.obj",
-    "brezel.obj",
-    "three-holes.off",
-    "elephant-genus3.obj",
-    "fertility.off",
-    "face.obj",
-    "camelhead.off",
-    "lilium.obj",
-    "lego.ply",
-    "punctured-torus.obj",
-    "stanford-bunny.obj",
-    "beetle.obj",
-];
 
 fn main() {
     let arguments = Arguments::from_args();
@@ -44,13 +25,13 @@ fn main() {
         .and_then(|c| c.parent().map(|f| f.join("reference_u.npz")))
         .filter(|f| f.is_file());
     let mut trials = Vec::new();
-    for name in MODELS {
+    for (name, ..) in CLEAN {
         let file = corpus.as_ref().map(|c| c.join(name));
         trials.push(trial(format!("prescriptions/{name}"), file, |file| {
             prescriptions::converge(&file)
         }));
     }
-    for name in MODELS {
+    for (name, ..) in CLEAN {
         let file = corpus.as_ref().map(|c| c.join(name));
         trials.push(trial(format!("checked/{name}"), file, |file| {
             checked::first_prescription(&file)
@@ -73,7 +54,7 @@ fn main() {
         ("decimated", stress::decimated),
     ];
     for (what, run) in stress {
-        for name in MODELS {
+        for (name, ..) in CLEAN {
             let file = corpus.as_ref().map(|c| c.join(name));
             let run = move |file: PathBuf| run(&file);
             trials.push(trial(format!("stress/{what}/{name}"), file, run));
