@@ -7,3 +7,4 @@ pub mod overlay;
 pub mod patches;
 pub mod plane;
 pub mod rectangles;
+mod texels;

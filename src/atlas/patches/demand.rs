@@ -110,7 +110,7 @@ impl Demand {
 
 /// What images of these patches may have together, so that they hold `params.texel_budget`. `least` says how wide a texel of each may be at the most.
 pub(super) fn budget(demands: &[Demand], least: &[f64], params: &PatchParams) -> Budget {
-    let margin = (params.padding as f64).max(0.5);
+    let margin = params.padding as f64;
     let most = params.texel_budget as f64;
     let fits = |budget: &Budget| {
         let rows = demands.iter().zip(least);

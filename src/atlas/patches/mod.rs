@@ -42,9 +42,11 @@ mod tests;
 
 use crate::atlas::cut::CutGraph;
 use crate::atlas::develop::{Development, Unfolded};
+use crate::atlas::geometry_image::{image_origin, sample};
 use crate::atlas::overlay::Layout;
 use crate::atlas::plane::Similarity;
-use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, PatchId};
+use crate::atlas::texels::{Bend, FINER};
+use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, PatchId, VertexVec};
 use crate::geometry::mesh::Mesh;
 pub(crate) use bend::edge_bends;
 use demand::Sums;
@@ -52,6 +54,7 @@ use divide::Divider;
 pub use given::charts_of;
 use rayon::prelude::*;
 use rectangle::Oriented;
+use resolution::Raster;
 pub(crate) use seams::seams;
 use slit::Slit;
 #[cfg(test)]
@@ -315,21 +318,67 @@ pub fn layout(
             uv[f] = corners;
         }
     }
-    let (patches, packed) = with_images(&oriented, &divider.sums(&sets), params);
+    let sums = divider.sums(&sets);
     let seams = seams(mesh, &cut.is_cut, &face_patch, &uv);
-    Ok(PatchLayout {
+    let mut layout = PatchLayout {
         face_patch,
         uv,
-        patches,
+        patches: Vec::new(),
         seams,
-        packed,
-    })
+        packed: None,
+    };
+    // Rectangles have rasters of their own, and the one image of all has square texels.
+    (layout.patches, layout.packed) = match domain {
+        Domain::Flat if params.packed_side.is_none() => {
+            let rasters = rasters_by_bend(mesh, &layout, &oriented, &sums, params);
+            images(&oriented, Placed::of(&oriented, rasters, params), params)
+        }
+        _ => with_images(&oriented, &sums, params),
+    };
+    Ok(layout)
 }
 
-/// Gives patches their images and their places in the packed square.
+/// Rasters by how the surface bends in images of square texels. The patches of `layout` have none yet.
+fn rasters_by_bend(
+    mesh: &Mesh,
+    layout: &PatchLayout,
+    oriented: &[Oriented],
+    sums: &[Sums],
+    params: &PatchParams,
+) -> Vec<Raster> {
+    let finer = PatchParams {
+        texel_budget: params.texel_budget.saturating_mul(FINER),
+        ..params.clone()
+    };
+    let fine = resolution::rasters(oriented, sums, &finer);
+    let content = |(patch, raster): (&Oriented, &Raster)| raster.content(patch);
+    let contents: Vec<[f64; 2]> = oriented.iter().zip(&fine).map(content).collect();
+    let trial = PatchLayout {
+        patches: images(oriented, Placed::of(oriented, fine, &finer), &finer).0,
+        seams: Vec::new(),
+        ..layout.clone()
+    };
+    let no_scale = VertexVec::filled(0.0, mesh.connectivity.vertex_count());
+    let trial = sample(mesh, &trial, &no_scale, image_origin(mesh));
+    let bends = trial.iter().zip(contents);
+    let bends: Vec<Bend> = bends.map(|(image, n)| Bend::of(image, n)).collect();
+    let even = resolution::rasters(oriented, sums, params);
+    resolution::adapted(oriented, &even, &bends, params)
+}
+
+/// Gives patches images of square texels and their places in the packed square.
 fn with_images(
     oriented: &[Oriented],
     sums: &[Sums],
+    params: &PatchParams,
+) -> (Vec<Patch>, Option<PackedPlaces>) {
+    images(oriented, place(oriented, sums, params), params)
+}
+
+/// The patches with their images, and the places of these in the packed square.
+fn images(
+    oriented: &[Oriented],
+    placed: Placed,
     params: &PatchParams,
 ) -> (Vec<Patch>, Option<PackedPlaces>) {
     let Placed {
@@ -337,11 +386,11 @@ fn with_images(
         sizes,
         corners,
         side,
-    } = place(oriented, sums, params);
+    } = placed;
     let contents: Vec<[f64; 2]> = oriented
         .iter()
         .zip(&rasters)
-        .map(|(patch, raster)| [raster.density, raster.density * patch.height])
+        .map(|(patch, raster)| square_content(patch, raster, params))
         .collect();
     let patches = oriented
         .iter()
@@ -385,26 +434,29 @@ fn segment_into(slit: &Slit, domain: Domain, params: &PatchParams) -> (Vec<Vec<F
 
 /// Rasters with their boxes in the packed square, and its side, in texels; corners count from the lower left.
 struct Placed {
-    rasters: Vec<resolution::Raster>,
+    rasters: Vec<Raster>,
     sizes: Vec<[usize; 2]>,
     corners: Vec<[usize; 2]>,
     side: usize,
 }
 
 impl Placed {
-    fn with_budget(patches: &[Oriented], sums: &[Sums], params: &PatchParams) -> Self {
-        let rasters = resolution::rasters(patches, sums, params);
-        // In the packed square every patch has its image's density, on square texels.
+    fn of(patches: &[Oriented], rasters: Vec<Raster>, params: &PatchParams) -> Self {
         let sizes: Vec<[usize; 2]> = patches
             .iter()
             .zip(&rasters)
             .map(|(patch, raster)| {
-                let rows = (raster.density * patch.height - 1e-6).ceil().max(1.0);
-                let rows = (rows + 2.0 * raster.margin).round() as usize;
+                let [width, height] = square_content(patch, raster, params);
+                let sized = |n: f64, margin: f64| {
+                    ((n - 1e-6).ceil().max(1.0) + 2.0 * margin).round() as usize
+                };
                 match params.packed_side {
                     // The image itself must find room.
-                    Some(_) => [raster.width, rows.max(raster.height)],
-                    None => [raster.width, rows],
+                    Some(_) => [
+                        raster.width,
+                        sized(height, raster.margin).max(raster.height),
+                    ],
+                    None => [width, height].map(|n| sized(n, raster.margin.max(0.5))),
                 }
             })
             .collect();
@@ -422,6 +474,17 @@ impl Placed {
     }
 }
 
+/// Columns and rows of a patch in the packed square, where texels are square: about as many as its image has.
+fn square_content(patch: &Oriented, raster: &Raster, params: &PatchParams) -> [f64; 2] {
+    let [columns, rows] = raster.density;
+    let density = match params.packed_side {
+        // That of the image, texel for texel.
+        Some(_) => columns,
+        None => (columns * rows).sqrt().min(4.0 * columns),
+    };
+    [density, density * patch.height]
+}
+
 /// Gives the patches as many texels as the budget has, or, where a side is asked for, as fit; the least that patches must have may be more.
 fn place(patches: &[Oriented], sums: &[Sums], params: &PatchParams) -> Placed {
     let with = |texel_budget: usize| {
@@ -429,7 +492,8 @@ fn place(patches: &[Oriented], sums: &[Sums], params: &PatchParams) -> Placed {
             texel_budget,
             ..params.clone()
         };
-        Placed::with_budget(patches, sums, &params)
+        let rasters = resolution::rasters(patches, sums, &params);
+        Placed::of(patches, rasters, &params)
     };
     let whole = with(params.texel_budget);
     let Some(most) = params.packed_side.filter(|&most| whole.side > most) else {

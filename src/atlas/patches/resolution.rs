@@ -1,10 +1,14 @@
 //! How many texels each patch gets: as its [demand](super::demand) says, so that the error is as small as the budget lets it be, with a floor so
 //! that no patch is too coarse to be of use.
+//!
+//! First texels are square ([`rasters`]). Images with such texels tell how the surface bends along and across each patch; with that, columns and rows get
+//! numbers of their own ([`adapted`]), since on a tube texels along it may be longer.
 
 use super::demand::{self, Demand, Sums};
 use super::raster::{cover, to_texel};
 use super::rectangle::Oriented;
 use super::{MAX_SIDE, PatchParams};
+use crate::atlas::texels::{Bend, Shares};
 
 /// Least texels on the shorter side, where that does not make the longer one absurd …
 const MIN_SHORT_SIDE: f64 = 8.0;
@@ -24,15 +28,15 @@ pub(super) struct Raster {
     pub height: usize,
     /// See [`super::Patch::texel_to_patch`].
     pub texel_to_patch: [[f64; 3]; 2],
-    /// Texels a unit of u.
-    pub density: f64,
+    /// Texels a unit of u, and as many of v.
+    pub density: [f64; 2],
     /// Columns and rows between the image's border and the patch's rectangle, at least.
     pub margin: f64,
 }
 
 /// Rasters of all patches; `sums` are their areas and bends.
 pub(super) fn rasters(patches: &[Oriented], sums: &[Sums], params: &PatchParams) -> Vec<Raster> {
-    let margin = (params.padding as f64).max(0.5);
+    let margin = params.padding as f64;
     let most = densest(params);
     let demand = |(patch, sums): (&Oriented, &Sums)| {
         let width = patch.to_chart.scale;
@@ -69,6 +73,60 @@ pub(super) fn rasters(patches: &[Oriented], sums: &[Sums], params: &PatchParams)
         .collect()
 }
 
+/// Rasters with as many texels together as the budget has, for which the error is least; those given are about even.
+pub(super) fn adapted(
+    patches: &[Oriented],
+    even: &[Raster],
+    bends: &[Bend],
+    params: &PatchParams,
+) -> Vec<Raster> {
+    let margin = params.padding as f64;
+    let least = patches.iter().flat_map(|patch| {
+        let by_area = area_floor(patch.area, params);
+        let columns = by_area.max(params.min_side as f64).min(densest(params));
+        [columns, least_short(params).max(by_area * patch.height)]
+    });
+    let content = patches
+        .iter()
+        .zip(even)
+        .flat_map(|(patch, r)| r.content(patch));
+    let shares = Shares {
+        of_image: (0..patches.len()).map(|i| [2 * i, 2 * i + 1]).collect(),
+        least: least.collect(),
+        border: 2.0 * margin,
+    };
+    let intervals = shares.bent(bends, content.collect(), params.texel_budget);
+    let covered_least = least_covered(params);
+    let raster = |(patch, intervals): (&Oriented, &[f64])| {
+        let mut intervals = intervals.to_vec();
+        loop {
+            let [columns, rows] = intervals[..] else {
+                return isotropic(patch.height, densest(params), margin);
+            };
+            let density = [columns, rows / patch.height.max(1e-12)];
+            let raster = raster(patch.height, columns, density, rows, margin);
+            let is_finest = columns.max(rows) >= densest(params);
+            if is_finest || covered(patch, &raster, covered_least) >= covered_least {
+                return raster;
+            }
+            let finer = |k: &f64| (2.0 * k).min(densest(params));
+            intervals = intervals.iter().map(finer).collect();
+        }
+    };
+    patches
+        .iter()
+        .zip(intervals.chunks(2))
+        .map(raster)
+        .collect()
+}
+
+impl Raster {
+    /// Columns and rows of the patch's rectangle.
+    pub fn content(&self, patch: &Oriented) -> [f64; 2] {
+        [self.density[0], self.density[1] * patch.height]
+    }
+}
+
 /// Most texels on the longer side of a patch.
 fn densest(params: &PatchParams) -> f64 {
     (MAX_SIDE - 2 * params.padding.max(1)) as f64
@@ -88,11 +146,16 @@ fn least_covered(params: &PatchParams) -> usize {
 fn least_density(height: f64, area: f64, params: &PatchParams) -> f64 {
     let least = least_short(params);
     let short_side = least / height.max(f64::MIN_POSITIVE);
-    let area = least / area.max(f64::MIN_POSITIVE).sqrt();
     (params.min_side as f64)
         .max(short_side.min(ENOUGH_LONG_SIDE))
-        .max(area.min(ENOUGH_LONG_SIDE))
+        .max(area_floor(area, params))
         .min(densest(params))
+}
+
+/// Least texels on the longer side of a patch, of whose square its area is a part.
+fn area_floor(area: f64, params: &PatchParams) -> f64 {
+    let side = least_short(params) / area.max(f64::MIN_POSITIVE).sqrt();
+    side.min(ENOUGH_LONG_SIDE)
 }
 
 /// The widest texel that the image of a patch may have.
@@ -127,7 +190,7 @@ fn raster(height: f64, columns: f64, density: [f64; 2], rows: f64, margin: f64) 
             [1.0 / density[0], 0.0, -left / density[0]],
             [0.0, -1.0 / density[1], (image[1] - bottom) / density[1]],
         ],
-        density: density[0],
+        density,
         margin,
     }
 }
@@ -198,10 +261,10 @@ mod tests {
         let areas = [4.0, 1.0, 1.0, 1e-9];
         let sums = [0, 1, 2, 3].map(|i| even(areas[i], patches[i].height));
         let r = rasters(&patches, &sums, &params);
-        let inside = |i: usize| r[i].density * r[i].density * patches[i].height;
+        let inside = |i: usize| r[i].density[0] * r[i].density[1] * patches[i].height;
         assert!((inside(0) / inside(1) / 4.0 - 1.0).abs() < 0.02);
         assert!((inside(1) / inside(2) - 1.0).abs() < 0.02);
-        assert_eq!(r[3].density, params.min_side as f64);
+        assert_eq!(r[3].density[0], params.min_side as f64);
         let total: f64 = r.iter().map(|r| (r.width * r.height) as f64).sum();
         assert!((total / params.texel_budget as f64 - 1.0).abs() < 0.02);
     }
@@ -214,7 +277,7 @@ mod tests {
                 min_side,
                 ..PatchParams::default()
             };
-            rasters(&[rectangle(0.1)], &[even(1.0, 0.1)], &params)[0].density
+            rasters(&[rectangle(0.1)], &[even(1.0, 0.1)], &params)[0].density[0]
         };
         assert_eq!([4, 8, 16, 32].map(columns), [20.0, 40.0, 80.0, 80.0]);
     }
@@ -232,7 +295,7 @@ mod tests {
                 let r = &rasters(&[rectangle(height)], &[even(1.0, height)], &params)[0];
                 for p in patch.uv.iter().flatten() {
                     let [x, y] = to_texel(&r.texel_to_patch, *p);
-                    let margin = (padding as f64).max(0.5) - 1e-5;
+                    let margin = padding as f64 - 1e-5;
                     assert!(x >= margin && x <= r.width as f64 - margin);
                     assert!(y >= margin && y <= r.height as f64 - margin, "{y} {r:?}");
                 }

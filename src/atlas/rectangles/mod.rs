@@ -14,7 +14,7 @@
 //! which cannot be chosen. The two conformal maps on both sides of a wall stretch it differently, and crowd it at corners: its parameter is its length in
 //! space, more where the surface bends (`density`, `walls`), and each quad is mapped to its rectangle with the border so given, harmonically at first and then so that no part is
 //! stretched much more than it is to be (`place`). The final triangulation of a quad is not that of the surface, so the surface is refined once more, and what is linear on its
-//! faces is carried over (`lift`). How the images of even texels bend says how many samples every strip of sides gets (`bends`, `counts`).
+//! faces is carried over (`lift`). How the images of even texels bend says how many samples every strip of sides gets (`texels`, `counts`).
 //!
 //! *Guaranteed:* patches are injective, as harmonic maps to convex shapes are; every side of a rectangle is a whole side of its
 //! neighbour, corner to corner, with as many samples (`counts`), and sample i of n from one corner is the same point for both, to the
@@ -24,7 +24,6 @@
 //! The tutorial shows rectangles for disks only (Fig. 10 and 18, four corners of π/2); quads by joining centres to middles are
 //! E. Catmull, J. Clark, *Recursively generated B-spline surfaces on arbitrary topological meshes* (1978).
 
-mod bends;
 mod chord;
 mod contract;
 mod counts;
@@ -52,13 +51,13 @@ use crate::atlas::develop::Development;
 use crate::atlas::geometry_image::{image_origin, sample};
 use crate::atlas::overlay::OverlayError;
 use crate::atlas::patches::{Patch, PatchLayout, PatchParams, packed, seams};
+use crate::atlas::texels::{Bend, FINER};
 use crate::flow::cones::Prescription;
 use crate::flow::ricci::{FlatMetric, FlowError};
 use crate::flow::solve::SolveError;
 use crate::geometry::connectivity::ConnectivityError;
 use crate::geometry::ids::{FaceVec, PatchId};
 use crate::geometry::mesh::Mesh;
-use bends::Bend;
 use counts::Strips;
 use flow::Rectangle;
 use glue::Added;
@@ -66,10 +65,6 @@ use quads::Quad;
 use rayon::prelude::*;
 use sides::Drawing;
 use subdivision::Subdivision;
-
-/// Bends are measured on images with so many times the texels that they will have: coarser ones do not see what is between their texels, much finer ones see the
-/// mesh's own edges.
-const FINER: usize = 2;
 
 // Dividing the regions whose images turned out worst, and drawing all walls anew after it, gained up to 1.4 dB more. But walls that are drawn over and over split faces
 // into ever smaller ones, whose flat lengths no longer add up to the cone metric: angle sums were off by up to 4e-5.
@@ -224,7 +219,7 @@ pub fn rectangles(
 fn bends(surface: &Charted, layout: &PatchLayout, rectangles: &[Rectangle]) -> Vec<Bend> {
     let mesh = &surface.mesh;
     let images = sample(mesh, layout, &surface.metric.log_scale, image_origin(mesh));
-    let bends = images.iter().map(Bend::of).zip(rectangles);
+    let bends = images.iter().map(Bend::of_grid).zip(rectangles);
     bends
         .map(|(bend, rectangle)| match rectangle.origin % 2 {
             0 => bend,

@@ -1,6 +1,6 @@
-//! How the surface bends in a rectangle, measured on an image of it.
+//! How the surface bends in a patch, measured on an image of it.
 //!
-//! *Enters:* a full grid of samples. *Leaves:* a [`Bend`]: what the squared error of an image with m × n intervals would be.
+//! *Enters:* a grid of samples, with or without a mask. *Leaves:* a [`Bend`]: what the squared error of an image with m × n intervals would be.
 //!
 //! In a cell of such an image the surface is, up to third order, x + (a s² + 2 c s t + b t²) / 2 above the plane through its corners, where a, b and c are the normal parts
 //! of second differences. Two linear triangles that hold the corners are off by a mean square of (a² + b²)/120 + a b/72 + c²/90. With k times
@@ -11,7 +11,7 @@ use crate::geometry::mesh::{cross, norm, sub};
 
 /// The squared distance, integrated over the surface, between it and an image with m × n intervals is a/m⁴ + b/n⁴ + c/m²n².
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Bend {
+pub(in crate::atlas) struct Bend {
     /// a and b.
     pub along: [f64; 2],
     /// c, not negative.
@@ -19,13 +19,23 @@ pub(super) struct Bend {
 }
 
 impl Bend {
-    /// Measured on an image without a mask, whose columns are the first number.
-    pub fn of(image: &GeometryImage) -> Self {
+    /// Measured on an image whose patch is as wide and high as so many of its texels. Next to the mask's border there are no second differences: the rest stands for it.
+    pub fn of(image: &GeometryImage, [m, n]: [f64; 2]) -> Self {
         let (width, height) = (image.width, image.height);
         let at = |column: usize, row: usize| image.position[width * row + column].map(f64::from);
+        let is_inside = |column: usize, row: usize| image.alpha[width * row + column] > 0.0;
         let mut sums = [0.0; 3];
+        let (mut inside, mut measured) = (0usize, 0usize);
         for row in 1..height.saturating_sub(1) {
             for column in 1..width.saturating_sub(1) {
+                if !is_inside(column, row) {
+                    continue;
+                }
+                inside += 1;
+                if !(0..9).all(|i| is_inside(column + i % 3 - 1, row + i / 3 - 1)) {
+                    continue;
+                }
+                measured += 1;
                 let p = at(column, row);
                 let [west, east] = [at(column - 1, row), at(column + 1, row)];
                 let [north, south] = [at(column, row - 1), at(column, row + 1)];
@@ -46,11 +56,19 @@ impl Bend {
                 sums[2] += cell * (a * b / 72.0 + c * c / 90.0);
             }
         }
-        let [m, n] = [width, height].map(|n| n.saturating_sub(1) as f64);
+        let whole = inside as f64 / measured.max(1) as f64;
         Self {
-            along: [sums[0] * m.powi(4), sums[1] * n.powi(4)],
-            twist: (sums[2] * m * m * n * n).max(0.0),
+            along: [whole * sums[0] * m.powi(4), whole * sums[1] * n.powi(4)],
+            twist: (whole * sums[2] * m * m * n * n).max(0.0),
         }
+    }
+
+    /// Measured on a full grid from corner to corner.
+    pub fn of_grid(image: &GeometryImage) -> Self {
+        Self::of(
+            image,
+            [image.width, image.height].map(|n| n.saturating_sub(1) as f64),
+        )
     }
 
     /// The other side first.
@@ -130,15 +148,15 @@ mod tests {
             ("waves", |u, v| 0.003 * (6.0 * u).sin() * (7.0 * v).cos()),
         ];
         for (name, surface) in surfaces {
-            let bend = Bend::of(&image(65, 49, surface));
+            let bend = Bend::of_grid(&image(65, 49, surface));
             for (m, n) in [(20, 20), (40, 15), (12, 30)] {
                 let ratio = bend.error([m as f64, n as f64]) / measured(m, n, surface);
                 // The border has no second differences, 8 % of the image; the diagonal of a cell may run either way.
                 assert!((0.8..1.25).contains(&ratio), "{name} {m} {n}: {ratio}");
             }
-            let turned = Bend::of(&image(49, 65, |u, v| surface(v, u))).turned();
+            let turned = Bend::of_grid(&image(49, 65, |u, v| surface(v, u))).turned();
             assert!((turned.error([20.0, 30.0]) / bend.error([20.0, 30.0]) - 1.0).abs() < 1e-3);
         }
-        assert!(Bend::of(&image(9, 9, |_, _| 0.0)).error([3.0, 3.0]) < 1e-12);
+        assert!(Bend::of_grid(&image(9, 9, |_, _| 0.0)).error([3.0, 3.0]) < 1e-12);
     }
 }
