@@ -1,7 +1,7 @@
 //! `affine-atlas build`.
 
 use super::arguments::{Build, Global, LogFormat};
-use super::plan::{Plan, plan};
+use super::inputs::{Selection, select};
 use super::problem::Problem;
 use super::progress::Progress;
 use super::work::Work;
@@ -18,16 +18,16 @@ const WORKER: &[&str] = &["worker"];
 
 /// Builds every asset, shows what became of each, and gives the exit code.
 pub fn run(build: &Build, global: &Global, work: &Work) -> Result<u8, Problem> {
-    let plan = plan(&build.inputs, build.out.as_deref())?;
-    plan.keep_inputs(|asset| plan.folder(asset))?;
-    let tasks = plan.tasks();
+    let selected = select(&build.inputs, build.out.as_deref())?;
+    selected.keep_inputs(|asset| selected.folder(asset))?;
+    let tasks = selected.tasks();
     let batch = Batch {
-        output: &plan.output,
+        output: &selected.output,
         program: program()?,
         arguments: WORKER,
         force: build.force,
-        jobs: build.jobs.map_or(plan.config.run.jobs, usize::from),
-        total_memory: plan.config.run.total_memory,
+        jobs: build.jobs.map_or(selected.config.run.jobs, usize::from),
+        total_memory: selected.config.run.total_memory,
         threads: global.threads.map(usize::from),
         voice: voice(global),
     };
@@ -44,7 +44,7 @@ pub fn run(build: &Build, global: &Global, work: &Work) -> Result<u8, Problem> {
     let (outcomes, recorded) = (work.batch)(&batch, &tasks, &progress);
     progress.finish();
     let recorded = recorded.map_err(|failure| Problem::NotRecorded {
-        path: plan.output.join("manifest.jsonl"),
+        path: selected.output.join("manifest.jsonl"),
         reason: failure.message,
     });
     if outcomes.is_empty() {
@@ -58,7 +58,7 @@ pub fn run(build: &Build, global: &Global, work: &Work) -> Result<u8, Problem> {
         terminal::print_error(&summary::failures(&outcomes));
     }
     recorded?;
-    write_records(build, &plan, &tasks, &outcomes)?;
+    write_records(build, &selected, &tasks, &outcomes)?;
     Ok(exit_code(&outcomes))
 }
 
@@ -117,11 +117,11 @@ fn show_decisions(tasks: &[Task], verdicts: &[Verdict], global: &Global) -> u8 {
 /// What other programs read.
 fn write_records(
     build: &Build,
-    plan: &Plan,
+    selected: &Selection,
     tasks: &[Task],
     outcomes: &[AssetOutcome],
 ) -> Result<(), Problem> {
-    let junit_xml = plan.output.join("junit.xml");
+    let junit_xml = selected.output.join("junit.xml");
     check::write_whole(&junit_xml, junit(outcomes).as_bytes()).map_err(
         |problem| match problem {
             Problem::NotWritten { path, reason } => Problem::NotRecorded { path, reason },
@@ -130,8 +130,8 @@ fn write_records(
     )?;
     if let Some(path) = &build.depfile {
         let files = tasks.iter().flat_map(|task| &task.files);
-        let files = files.chain(&plan.files).map(PathBuf::as_path);
-        let text = depfile(&plan.output.join("manifest.jsonl"), files);
+        let files = files.chain(&selected.files).map(PathBuf::as_path);
+        let text = depfile(&selected.output.join("manifest.jsonl"), files);
         check::write_whole(path, text.as_bytes())?;
     }
     Ok(())

@@ -7,10 +7,11 @@ mod cones;
 mod explain;
 mod fit;
 mod init;
+mod inputs;
 mod interrupt;
 mod log;
 mod panics;
-mod plan;
+
 mod problem;
 mod progress;
 mod rebuild;

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 /// What is to be done.
 #[derive(Debug)]
-pub struct Plan {
+pub struct Selection {
     /// The effective configuration.
     pub config: Config,
     /// The output folder, relative to the current folder or absolute.
@@ -21,7 +21,7 @@ pub struct Plan {
     pub assets: Vec<Asset>,
     /// The settings of each asset.
     pub settings: Vec<Arc<Settings>>,
-    /// Files that were read to make the plan.
+    /// Files that were read to find that out.
     pub files: Vec<PathBuf>,
 }
 
@@ -30,7 +30,7 @@ pub struct Plan {
 /// Positional arguments that end in `.toml` are a configuration, all others name meshes and take
 /// the place of `input.paths`. Meshes without a configuration use the defaults; `config.toml` is
 /// read only where nothing is named at all.
-pub fn plan(inputs: &Inputs, out: Option<&Path>) -> Result<Plan, Problem> {
+pub fn select(inputs: &Inputs, out: Option<&Path>) -> Result<Selection, Problem> {
     let (configs, meshes): (Vec<&PathBuf>, Vec<&PathBuf>) =
         inputs.inputs.iter().partition(|path| is_config(path));
     let default = PathBuf::from("config.toml");
@@ -74,7 +74,7 @@ pub fn plan(inputs: &Inputs, out: Option<&Path>) -> Result<Plan, Problem> {
     let settings = settings(&mut loaded, &assets)?;
     let mut files = loaded.files;
     files.extend(inputs.lists);
-    Ok(Plan {
+    Ok(Selection {
         settings,
         config: loaded.config,
         output,
@@ -116,7 +116,7 @@ fn is_config(path: &Path) -> bool {
         .is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
 }
 
-impl Plan {
+impl Selection {
     /// The folder that is written for an asset.
     pub fn folder(&self, asset: &Asset) -> PathBuf {
         self.output.join(&asset.id)
@@ -134,7 +134,7 @@ impl Plan {
         items.par_iter().map(look).collect()
     }
 
-    /// Refuses a plan in which an asset's folder, which is replaced as a whole, holds an input:
+    /// Refuses a selection in which an asset's folder, which is replaced as a whole, holds an input:
     /// `build spot/spot.obj --out .` must not delete `spot/spot.obj`.
     /// `folder` is that of an asset.
     pub fn keep_inputs(&self, folder: impl Fn(&Asset) -> PathBuf) -> Result<(), Problem> {
@@ -185,11 +185,11 @@ mod tests {
 
     #[test]
     fn meshes_use_the_defaults_and_start_at_the_current_folder() {
-        let plan = plan(&inputs(&[Path::new("m/a.obj")], &[]), None).expect("planned");
-        assert_eq!(plan.assets[0].path, Path::new("m/a.obj"));
-        assert_eq!(plan.output, Path::new("affine-atlas-out"));
+        let selected = select(&inputs(&[Path::new("m/a.obj")], &[]), None).expect("selected");
+        assert_eq!(selected.assets[0].path, Path::new("m/a.obj"));
+        assert_eq!(selected.output, Path::new("affine-atlas-out"));
         assert_eq!(
-            plan.folder(&plan.assets[0]),
+            selected.folder(&selected.assets[0]),
             Path::new("affine-atlas-out/a")
         );
     }
@@ -203,10 +203,10 @@ mod tests {
             "[input]\npaths = [\"x.obj\"]\n[patches]\npadding = 7",
         )
         .expect("written");
-        let own = plan(&inputs(&[&file], &[]), Some(Path::new("out"))).expect("planned");
+        let own = select(&inputs(&[&file], &[]), Some(Path::new("out"))).expect("selected");
         assert_eq!(own.assets[0].path, folder.path().join("x.obj"));
         assert_eq!(own.output, Path::new("out"));
-        let other = plan(&inputs(&[Path::new("y.obj"), &file], &[]), None).expect("planned");
+        let other = select(&inputs(&[Path::new("y.obj"), &file], &[]), None).expect("selected");
         assert_eq!(other.assets[0].path, Path::new("y.obj"));
         assert_eq!(other.output, folder.path().join("affine-atlas-out"));
         assert_eq!(other.config.patches.padding, 7);
@@ -214,12 +214,12 @@ mod tests {
 
     #[test]
     fn two_configurations_and_no_mesh_are_refused() {
-        let two = plan(
+        let two = select(
             &inputs(&[Path::new("a.toml"), Path::new("b.toml")], &[]),
             None,
         );
         assert!(matches!(two, Err(Problem::TwoConfigs { .. })));
-        let none = plan(&inputs(&[Path::new("a.obj")], &["flow.scheme"]), None);
+        let none = select(&inputs(&[Path::new("a.obj")], &["flow.scheme"]), None);
         assert!(matches!(none, Err(Problem::Config(_))));
     }
 
@@ -230,12 +230,12 @@ mod tests {
         std::fs::create_dir(&inner).expect("created");
         let mesh = inner.join("spot.obj");
         std::fs::write(&mesh, "").expect("written");
-        let inside = plan(&inputs(&[&mesh], &[]), Some(folder.path())).expect("planned");
+        let inside = select(&inputs(&[&mesh], &[]), Some(folder.path())).expect("selected");
         assert!(matches!(
             inside.keep_inputs(|asset| inside.folder(asset)),
             Err(Problem::OverwritesInput { .. })
         ));
-        let beside = plan(&inputs(&[&mesh], &[]), Some(&inner)).expect("planned");
+        let beside = select(&inputs(&[&mesh], &[]), Some(&inner)).expect("selected");
         beside
             .keep_inputs(|asset| beside.folder(asset))
             .expect("spot/spot does not exist");
