@@ -1,7 +1,7 @@
 //! `affine-atlas cones`.
 
 use super::arguments::{Cones, Global, LogFormat};
-use super::build::exit_code;
+use super::batch::exit_code;
 use super::inputs::{Selection, select, start_threads};
 use super::problem::Problem;
 use super::progress::Progress;
