@@ -181,3 +181,6 @@ pub fn history_before(plan: &Plan) -> Result<PathBuf, ExportError> {
     }
     Ok(aside)
 }
+
+#[cfg(test)]
+mod tests;

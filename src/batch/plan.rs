@@ -15,18 +15,22 @@
 //! *Not guaranteed:* that inputs are still as they were; whoever does a task looks again. Paths start at the folder in which the plan was made,
 //! because file systems are mounted at different places on different machines; [`Plan::check_place`] finds out whether that is here.
 
+mod error;
+mod read;
+
+pub use error::PlanError;
+
 use super::cache::{VERSION, Verdict};
 use super::task::{Settings, Task};
 use super::{limits, private_folder};
 use crate::config::Config;
-use crate::export::folder::{is_asset_name, unique_name};
+use crate::export::folder::unique_name;
 use crate::export::{Action, ExportError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::collections::{BTreeMap, HashMap, HashSet};
-use std::fs::{self, File};
-use std::io::{self, BufRead, BufReader, Read};
+use std::collections::{BTreeMap, HashMap};
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
@@ -35,10 +39,6 @@ use std::time::SystemTime;
 const FORMAT: &str = "affine-atlas-plan";
 /// Version of the format.
 const FORMAT_VERSION: u32 = 1;
-/// No line is longer, bytes: another file that was named by mistake is not read into memory.
-const LONGEST_LINE: u64 = 64 << 20;
-/// Most letters of an id.
-const LONGEST_ID: usize = 64;
 
 /// Where a plan's shards write down what they did, below an output root.
 #[must_use]
@@ -186,121 +186,6 @@ impl Purpose {
     }
 }
 
-/// Why a plan cannot be made or carried out.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum PlanError {
-    /// A path that a plan cannot hold.
-    #[error("the path {} is no Unicode text, and a plan holds nothing else", path.display())]
-    NotUnicode {
-        /// Which.
-        path: PathBuf,
-    },
-    /// The file cannot be read.
-    #[error("the plan {} cannot be read: {reason}", path.display())]
-    Unreadable {
-        /// Which.
-        path: PathBuf,
-        /// What the system said.
-        reason: String,
-    },
-    /// Another sort of file.
-    #[error("{} is no plan: its first line is not one that `affine-atlas plan` writes", path.display())]
-    NoPlan {
-        /// Which.
-        path: PathBuf,
-    },
-    /// A later format.
-    #[error("the plan {} has version {found} of its format, and this program reads version {FORMAT_VERSION}", path.display())]
-    Format {
-        /// Which.
-        path: PathBuf,
-        /// Its version.
-        found: u32,
-    },
-    /// Another version of the program made it.
-    #[error("the plan {} was made by version {found} of affine-atlas, and this is {VERSION}", path.display())]
-    Version {
-        /// Which.
-        path: PathBuf,
-        /// The version that made it.
-        found: String,
-    },
-    /// The end is missing.
-    #[error("the plan {} ends after line {lines}, and its last line is missing", path.display())]
-    Cut {
-        /// Which.
-        path: PathBuf,
-        /// Whole lines that are there.
-        lines: usize,
-    },
-    /// A line is not what was written.
-    #[error("line {line} of the plan {} is damaged: {reason}", path.display())]
-    Damaged {
-        /// Which.
-        path: PathBuf,
-        /// From 1.
-        line: usize,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// Every line is one, but not all are those that were written.
-    #[error("the plan {} was changed: its lines have the hash {found}, and its last line says {stated}", path.display())]
-    Changed {
-        /// Which.
-        path: PathBuf,
-        /// Of the lines that are there.
-        found: String,
-        /// Of those that were written.
-        stated: String,
-    },
-    /// A configuration means something else to this program.
-    #[error("line {line} of the plan {}: the configuration has the hash {found} here and {stated} where the plan was made", path.display())]
-    OtherConfig {
-        /// Which.
-        path: PathBuf,
-        /// From 1.
-        line: usize,
-        /// Its hash here.
-        found: String,
-        /// Its hash in the plan.
-        stated: String,
-    },
-    /// The current folder is not the one in which it was made.
-    #[error("the plan was made in {}, and this is {}, from where {missing} is not to be seen", folder.display(), here.display())]
-    Elsewhere {
-        /// The plan's.
-        folder: PathBuf,
-        /// The current one.
-        here: PathBuf,
-        /// What.
-        missing: String,
-    },
-}
-
-impl PlanError {
-    /// What to change.
-    #[must_use]
-    pub fn remedy(&self) -> &'static str {
-        match self {
-            Self::NotUnicode { .. } => "rename it, or use `affine-atlas build`",
-            Self::Unreadable { .. } => {
-                "check the name; `affine-atlas plan … --plan FILE` writes one"
-            }
-            Self::NoPlan { .. } => "name a file that `affine-atlas plan … --plan FILE` wrote",
-            Self::Format { .. } | Self::Version { .. } => {
-                "plan again with this version, or carry the plan out with that one"
-            }
-            Self::Cut { .. } | Self::Damaged { .. } | Self::Changed { .. } => {
-                "copy it again, or plan again: what is built is not built again"
-            }
-            Self::OtherConfig { .. } => "plan again with this program",
-            Self::Elsewhere { .. } => {
-                "start it in the folder in which the plan was made, wherever that is mounted on this machine, or plan again"
-            }
-        }
-    }
-}
-
 impl Plan {
     /// Makes a plan of tasks and what the cache says of each.
     ///
@@ -425,106 +310,6 @@ impl Plan {
         text
     }
 
-    /// Reads a plan.
-    ///
-    /// # Errors
-    /// [`PlanError`] for whatever is not a whole plan of this version.
-    pub fn read(path: &Path) -> Result<Self, PlanError> {
-        let unreadable = |error: io::Error| PlanError::Unreadable {
-            path: path.to_owned(),
-            reason: match error.kind() {
-                io::ErrorKind::NotFound => "there is no such file".to_owned(),
-                _ => error.to_string(),
-            },
-        };
-        let file = File::open(path).map_err(unreadable)?;
-        let mut lines = Lines {
-            path,
-            from: BufReader::new(file),
-            hasher: blake3::Hasher::new(),
-            number: 0,
-        };
-        let header = lines.header()?;
-        let (mut configurations, mut assets) = (Vec::new(), Vec::new());
-        let end = loop {
-            match lines.next()? {
-                Line::Configuration(one) if assets.is_empty() => {
-                    configurations.push((lines.number, one));
-                }
-                Line::Asset(one) => assets.push((lines.number, *one)),
-                Line::End(end) => break end,
-                _ => return Err(lines.damaged("it is not where it belongs")),
-            }
-        };
-        lines.finish(&end)?;
-        let settings = restore(path, configurations)?;
-        let damaged = |line, reason: String| PlanError::Damaged {
-            path: path.to_owned(),
-            line,
-            reason,
-        };
-        let mut known = HashSet::new();
-        let mut planned = Vec::with_capacity(assets.len());
-        for (line, one) in assets {
-            let PlannedLine {
-                mut task,
-                configuration,
-                decision,
-                reason,
-                estimate,
-            } = one;
-            match settings.get(configuration) {
-                Some(settings) if settings.hash == task.config_hash => {
-                    task.settings = Arc::clone(settings);
-                }
-                Some(settings) => {
-                    let reason = format!(
-                        "its configuration has the hash {}, not {}",
-                        settings.hash, task.config_hash
-                    );
-                    return Err(damaged(line, reason));
-                }
-                None => {
-                    let reason = format!(
-                        "it names configuration {configuration} of {}",
-                        settings.len()
-                    );
-                    return Err(damaged(line, reason));
-                }
-            }
-            if !is_asset_name(&task.id) {
-                return Err(damaged(
-                    line,
-                    format!("{:?} is no name of an asset", task.id),
-                ));
-            }
-            if !known.insert(task.id.clone()) {
-                return Err(damaged(line, format!("{} is there twice", task.id)));
-            }
-            planned.push(Planned {
-                task,
-                decision,
-                reason,
-                estimate,
-            });
-        }
-        let counts = (header.configurations, header.assets);
-        if counts != (settings.len(), planned.len()) {
-            let reason = format!(
-                "it states {} configurations and {} assets, and {} and {} follow",
-                counts.0,
-                counts.1,
-                settings.len(),
-                planned.len()
-            );
-            return Err(damaged(1, reason));
-        }
-        Ok(Self {
-            header,
-            assets: planned,
-        })
-    }
-
     /// Makes the folder for what shards write down, by which other machines know the place.
     ///
     /// # Errors
@@ -570,154 +355,11 @@ impl Plan {
     }
 }
 
-/// Settings as they were, of configurations with their line numbers.
-fn restore(
-    path: &Path,
-    configurations: Vec<(usize, Configuration)>,
-) -> Result<Vec<Arc<Settings>>, PlanError> {
-    let one = |(line, one): (usize, Configuration)| {
-        let mut config = one.config;
-        config.cones.file_lines = one.cone_lines;
-        let settings = Settings::new(config);
-        match settings.hash == one.config_hash {
-            true => Ok(Arc::new(settings)),
-            false => Err(PlanError::OtherConfig {
-                path: path.to_owned(),
-                line,
-                found: settings.hash,
-                stated: one.config_hash,
-            }),
-        }
-    };
-    configurations.into_iter().map(one).collect()
-}
-
 /// A line of JSON, without its break.
 fn line_of(value: &impl Serialize) -> String {
     serde_json::to_string(value)
         .expect("string keys and paths that are text, so that serialisation cannot fail")
 }
 
-/// Reads a plan line by line and hashes it.
-struct Lines<'p> {
-    path: &'p Path,
-    from: BufReader<File>,
-    hasher: blake3::Hasher,
-    /// Of the line that was read last, from 1.
-    number: usize,
-}
-
-impl Lines<'_> {
-    fn damaged(&self, reason: impl ToString) -> PlanError {
-        PlanError::Damaged {
-            path: self.path.to_owned(),
-            line: self.number,
-            reason: reason.to_string(),
-        }
-    }
-
-    /// The bytes of the next line without its break; none at the end of the file or where a line is cut or too long.
-    fn bytes(&mut self) -> Result<Option<Vec<u8>>, PlanError> {
-        let mut bytes = Vec::new();
-        let mut limited = self.from.by_ref().take(LONGEST_LINE);
-        let read = limited.read_until(b'\n', &mut bytes);
-        read.map_err(|error| PlanError::Unreadable {
-            path: self.path.to_owned(),
-            reason: error.to_string(),
-        })?;
-        Ok((bytes.pop() == Some(b'\n')).then_some(bytes))
-    }
-
-    fn header(&mut self) -> Result<Header, PlanError> {
-        let path = || self.path.to_owned();
-        let no_plan = PlanError::NoPlan { path: path() };
-        let cut = PlanError::Cut {
-            path: path(),
-            lines: 0,
-        };
-        #[derive(Deserialize)]
-        struct Outline {
-            format: String,
-            version: u32,
-        }
-        let Some(bytes) = self.bytes()? else {
-            return Err(no_plan);
-        };
-        let outline = serde_json::from_slice(&bytes);
-        let Ok(Outline { format, version }) = outline else {
-            return Err(match bytes.starts_with(b"{\"record\":\"plan\"") {
-                true => cut,
-                false => no_plan,
-            });
-        };
-        if format != FORMAT {
-            return Err(no_plan);
-        }
-        let path = self.path.to_owned();
-        if version != FORMAT_VERSION {
-            return Err(PlanError::Format {
-                path,
-                found: version,
-            });
-        }
-        self.number = 1;
-        self.hash(&bytes);
-        let header = match serde_json::from_slice(&bytes) {
-            Ok(Line::Plan(header)) => header,
-            Ok(_) => return Err(no_plan),
-            Err(error) => return Err(self.damaged(error)),
-        };
-        if header.program_version != VERSION {
-            return Err(PlanError::Version {
-                path,
-                found: header.program_version,
-            });
-        }
-        let in_id = |c: char| c.is_ascii_alphanumeric();
-        if !(1..=LONGEST_ID).contains(&header.id.len()) || !header.id.chars().all(in_id) {
-            return Err(self.damaged(format!("{:?} is no id of a plan", header.id)));
-        }
-        Ok(header)
-    }
-
-    /// The next line, which must be there.
-    fn next(&mut self) -> Result<Line, PlanError> {
-        let Some(bytes) = self.bytes()? else {
-            return Err(PlanError::Cut {
-                path: self.path.to_owned(),
-                lines: self.number,
-            });
-        };
-        self.number += 1;
-        let line = serde_json::from_slice(&bytes).map_err(|error| self.damaged(error))?;
-        if !matches!(line, Line::End(_)) {
-            self.hash(&bytes);
-        }
-        Ok(line)
-    }
-
-    fn hash(&mut self, line: &[u8]) {
-        self.hasher.update(line);
-        self.hasher.update(b"\n");
-    }
-
-    /// Nothing may follow the end, and the hash must be that of the lines before.
-    fn finish(mut self, end: &End) -> Result<(), PlanError> {
-        let found = self.hasher.finalize().to_hex().to_string();
-        if found != end.blake3 {
-            return Err(PlanError::Changed {
-                path: self.path.to_owned(),
-                found,
-                stated: end.blake3.clone(),
-            });
-        }
-        let more = self.from.fill_buf().is_ok_and(|rest| !rest.is_empty());
-        match more {
-            false => Ok(()),
-            true => {
-                self.number += 1;
-                Err(self.damaged("it follows the last one"))
-            }
-        }
-    }
-}
+#[cfg(test)]
+mod tests;

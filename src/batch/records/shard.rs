@@ -214,3 +214,140 @@ fn read_one(
     }
     Ok(Some(Attempt { shard, complete }))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::batch::shard::tests::plan;
+
+    const SHARD: Shard = Shard {
+        number: 2,
+        count: 3,
+    };
+
+    fn outcome(id: &str, state: AssetState) -> AssetOutcome {
+        let mut outcome = AssetOutcome::whole(id, state, 0.1 + 0.2);
+        outcome.files = vec!["atlas.json".into()];
+        outcome
+    }
+
+    fn found(root: &Path, plan: &str) -> (Vec<String>, Vec<Attempt>) {
+        let mut ids = Vec::new();
+        let attempts = read(root, plan, |finished| ids.push(finished.outcome.id)).unwrap();
+        (ids, attempts)
+    }
+
+    #[test]
+    fn what_is_written_is_read_as_soon_as_it_is_there() {
+        let root = tempfile::tempdir().unwrap();
+        let plan = plan(root.path(), &[1, 1, 1]);
+        let id = &plan.header.id;
+        assert_eq!(found(root.path(), id), (vec![], vec![]));
+        let mut recorder = ShardRecorder::begin(root.path(), id, SHARD).unwrap();
+        let attempt = |complete| {
+            vec![Attempt {
+                shard: SHARD,
+                complete,
+            }]
+        };
+        assert_eq!(found(root.path(), id), (vec![], attempt(false)));
+        let one = outcome("a001", AssetState::Built);
+        recorder.record(&plan.assets[1].task, &one);
+        let mut all = Vec::new();
+        let attempts = read(root.path(), id, |finished| all.push(finished)).unwrap();
+        assert_eq!(attempts, attempt(false));
+        let expected = Finished {
+            input_hash: Some("a001".into()),
+            config_hash: plan.assets[1].task.config_hash.clone(),
+            host: limits::host(),
+            outcome: one,
+        };
+        assert_eq!(all, [expected]);
+        recorder.finish().unwrap();
+        assert_eq!(found(root.path(), id), (vec!["a001".into()], attempt(true)));
+        assert_eq!(found(root.path(), "another"), (vec![], vec![]));
+    }
+
+    #[test]
+    fn a_shard_that_was_stopped_is_not_complete() {
+        let root = tempfile::tempdir().unwrap();
+        let plan = plan(root.path(), &[1, 1]);
+        let mut recorder = ShardRecorder::begin(root.path(), "p", SHARD).unwrap();
+        recorder.record(&plan.assets[0].task, &outcome("a000", AssetState::Built));
+        recorder.record(
+            &plan.assets[1].task,
+            &outcome("a001", AssetState::Cancelled),
+        );
+        recorder.finish().unwrap();
+        let (ids, attempts) = found(root.path(), "p");
+        assert_eq!(ids, ["a000", "a001"]);
+        assert!(!attempts[0].complete);
+    }
+
+    #[test]
+    fn cut_and_damaged_lines_count_as_not_there() {
+        let root = tempfile::tempdir().unwrap();
+        let plan = plan(root.path(), &[1, 1, 1]);
+        let mut recorder = ShardRecorder::begin(root.path(), "p", SHARD).unwrap();
+        for asset in &plan.assets {
+            recorder.record(&asset.task, &outcome(&asset.task.id, AssetState::Built));
+        }
+        let path = recorder.path.clone();
+        recorder.finish().unwrap();
+        let whole = fs::read(&path).unwrap();
+        for at in 0..whole.len() {
+            fs::write(&path, &whole[..at]).unwrap();
+            let (ids, attempts) = found(root.path(), "p");
+            assert!(ids.len() <= 3);
+            // The break at the very end may be missing.
+            let complete = attempts.iter().any(|attempt| attempt.complete);
+            assert_eq!(complete, at + 1 == whole.len(), "cut at {at}");
+        }
+        let text = String::from_utf8(whole).unwrap();
+        fs::write(
+            &path,
+            text.replacen("{\"record\":\"asset\"", "{\"record\":", 1),
+        )
+        .unwrap();
+        let (ids, attempts) = found(root.path(), "p");
+        assert_eq!(ids, ["a001", "a002"]);
+        assert!(!attempts[0].complete, "one line is missing");
+        // Of another plan, whatever its folder is called.
+        fs::write(&path, text.replacen("\"plan\":\"p\"", "\"plan\":\"q\"", 1)).unwrap();
+        assert_eq!(found(root.path(), "p"), (vec![], vec![]));
+    }
+
+    #[test]
+    fn two_processes_that_run_the_same_shard_write_two_files() {
+        let root = tempfile::tempdir().unwrap();
+        let plan = plan(root.path(), &[1]);
+        let mut one = ShardRecorder::begin(root.path(), "p", SHARD).unwrap();
+        let mut other = ShardRecorder::begin(root.path(), "p", SHARD).unwrap();
+        for recorder in [&mut one, &mut other] {
+            recorder.record(&plan.assets[0].task, &outcome("a000", AssetState::Built));
+        }
+        one.finish().unwrap();
+        let (ids, attempts) = found(root.path(), "p");
+        assert_eq!(ids.len(), 2);
+        assert_eq!(attempts.iter().filter(|a| a.complete).count(), 1);
+        drop(other);
+    }
+
+    #[test]
+    fn no_line_follows_one_that_could_not_be_written() {
+        let root = tempfile::tempdir().unwrap();
+        let plan = plan(root.path(), &[1, 1]);
+        let mut recorder = ShardRecorder::begin(root.path(), "p", SHARD).unwrap();
+        let task = |i: usize| &plan.assets[i].task;
+        recorder.record(task(0), &outcome("a000", AssetState::Built));
+        // Nothing can be written to a file that is open for reading.
+        let writable = std::mem::replace(&mut recorder.file, File::open(&recorder.path).unwrap());
+        recorder.record(task(1), &outcome("a001", AssetState::Built));
+        recorder.file = writable;
+        let error = recorder.finish().unwrap_err();
+        assert!(error.to_string().contains("shard-2-of-3"), "{error}");
+        let (ids, attempts) = found(root.path(), "p");
+        assert_eq!(ids, ["a000"]);
+        assert!(!attempts[0].complete);
+    }
+}
