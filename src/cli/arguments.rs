@@ -13,7 +13,7 @@ Exit codes:
     2  wrong arguments or configuration
     3  nothing to do
     4  an error of this program
-  130  stopped by Ctrl-C";
+  130  stopped by Ctrl-C or SIGTERM";
 
 /// Turns triangle meshes into affine atlases.
 ///
@@ -146,10 +146,10 @@ Examples:
   affine-atlas run --plan night.jsonl --shard 1/16       to 16/16, on any machines, in any order
   affine-atlas merge --plan night.jsonl
 
-Machines need a common file system with the meshes and OUT, and the same version of this program. Relative
-paths start at the folder in which the plan is made; start all three there. Shards are alike by expected
-time; their number is chosen with `run`, --shards only shows what it comes to. The plan holds all settings:
-no configuration is read again.";
+Machines need a common file system with the meshes and OUT, and the same version of this program.
+Relative paths start at the folder in which the plan is made: start all three there. Shards are of
+about the same expected time; how many there are is chosen with `run`, and --shards only shows what
+it comes to. The plan holds all settings: no configuration is read again.";
 
 const RUN_EXAMPLES: &str = "\
 Examples:
@@ -157,17 +157,18 @@ Examples:
   affine-atlas run --plan night.jsonl --shard $SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT
   affine-atlas run --plan night.jsonl                    all of it
 
-May be run again at any time, after a kill or by an engine that is not sure: what this plan has built is not built
-again, and reported as before. A request to stop (SIGTERM, Ctrl-C) ends it within seconds. Exit codes are those of
-a build of these meshes; a shard without meshes is good.";
+May be run again at any time, after a kill or by an engine that is not sure: what this plan has
+built is not built again, and reported as before. A request to stop (SIGTERM, Ctrl-C) ends it within
+seconds. Exit codes are those of a build of these meshes; a shard without meshes is good.";
 
 const MERGE_EXAMPLES: &str = "\
 Examples:
-  affine-atlas merge --plan night.jsonl                  exit code as of one build of all
-  affine-atlas merge --plan night.jsonl --incomplete     what is not done is recorded as cancelled: exit code 130
+  affine-atlas merge --plan night.jsonl
+  affine-atlas merge --plan night.jsonl --incomplete     also while some are not done
 
-Writes manifest.jsonl, junit.xml and index.html of OUT, as one build of all meshes would have. Where a mesh
-has not been built yet nothing is written, and the shards that it belongs to are named: exit code 1.";
+Writes manifest.jsonl, junit.xml and index.html of OUT as one build of all meshes would have, and
+gives its exit code. Where a mesh is not done nothing is written, and the shards that it belongs to
+are named: exit code 1. With --incomplete it is recorded as cancelled: exit code 130.";
 
 const CHECK_EXAMPLES: &str = "\
 Examples:

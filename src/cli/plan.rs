@@ -56,9 +56,12 @@ fn said(plan: &Plan, arguments: &Arguments) -> String {
         .assets
         .iter()
         .fold(0, |sum: u64, asset| sum.saturating_add(asset.estimate));
-    let seconds = |milliseconds: u64| in_words(milliseconds as f64 / 1e3);
+    let seconds = |milliseconds: u64| match milliseconds {
+        0..1000 => "less than 1 s".to_owned(),
+        _ => format!("about {}", in_words(milliseconds as f64 / 1e3)),
+    };
     let mut text = format!(
-        "{builds} of {all} to build, about {} of work one after the other\n",
+        "{builds} of {all} to build, {} of work one after the other\n",
         seconds(total)
     );
     if let Some(count) = arguments.shards {
@@ -69,13 +72,15 @@ fn said(plan: &Plan, arguments: &Arguments) -> String {
         let empty = count as usize - busy.len();
         let even = total as f64 / f64::from(count);
         text.push_str(&format!(
-            "{count} shards of about {} to {}, the largest {:.2} times an equal part",
+            "{count} shards of {} to {}, the largest {:.2} times an equal part",
             seconds(least),
             seconds(most),
             most as f64 / even.max(1.0)
         ));
-        if empty > 0 {
-            text.push_str(&format!("; {empty} have nothing to do"));
+        match empty {
+            0 => {}
+            1 => text.push_str("; 1 has nothing to do"),
+            _ => text.push_str(&format!("; {empty} have nothing to do")),
         }
         text.push('\n');
     }

@@ -25,7 +25,7 @@ pub enum Problem {
     Plan(#[from] PlanError),
     #[error("the current folder cannot be found: {reason}")]
     NoPlace { reason: String },
-    #[error("{missing} of {all} meshes are not done ({first}): {shards}")]
+    #[error("{missing} of {all} meshes {} not done ({first}): {shards}", if *missing == 1 { "is" } else { "are" })]
     NotDone {
         missing: usize,
         all: usize,

@@ -156,7 +156,10 @@ impl Lines<'_> {
         PlanError::Damaged {
             path: self.path.to_owned(),
             line: self.number,
-            reason: reason.to_string(),
+            // To its parser every line is the first.
+            reason: reason
+                .to_string()
+                .replace(" at line 1 column ", " at column "),
         }
     }
 
