@@ -80,7 +80,9 @@ fn merge(plan: &Plan, merged: &Merged) -> Result<(), Failure> {
         let before = merge::history_before(plan)?;
         merged.save(plan)?;
         let output = &plan.header.output;
-        index::write_against(output, &Manifest::load(output)?.0, &before)
+        index::write_against(output, &Manifest::load(output)?.0, &before)?;
+        merged.clear_up(plan);
+        Ok(())
     };
     write().map_err(failure)
 }

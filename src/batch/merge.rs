@@ -150,6 +150,9 @@ fn unfinished(plan: &Plan, missing: &[usize], attempts: &[Attempt]) -> Vec<(Shar
     all
 }
 
+/// In a plan's folder: all that it asked for was done and merged.
+const MERGED: &str = "merged";
+
 impl Merged {
     /// Puts all records into the manifest of the output root; other assets there keep theirs.
     ///
@@ -160,6 +163,31 @@ impl Merged {
         recorder.adopt(self.records.iter().cloned());
         recorder.finish()
     }
+
+    /// Removes what the shards of earlier plans wrote that were merged, so that nights do not add up; that of this plan stays, and if nothing is
+    /// missing goes with the next. To be called when everything else is written.
+    pub fn clear_up(&self, plan: &Plan) {
+        let own = plan_folder(&plan.header.output, &plan.header.id);
+        if self.missing.is_empty()
+            && let Err(error) = fs::write(own.join(MERGED), "")
+        {
+            tracing::debug!(%error, "this plan will not be cleared up");
+        }
+        let all = own.parent().and_then(|all| fs::read_dir(all).ok());
+        for entry in all.into_iter().flatten().flatten() {
+            let path = entry.path();
+            if path != own && path.join(MERGED).is_file() {
+                // What somebody still holds open stays until next time.
+                let _ = fs::remove_dir_all(path);
+            }
+        }
+    }
+}
+
+/// Whether anything is there of what shards of a plan may have written.
+#[must_use]
+pub fn is_gone(plan: &Plan) -> bool {
+    !plan_folder(&plan.header.output, &plan.header.id).exists()
 }
 
 /// The history of the run before this plan's, for the [`index`](crate::export::index) to compare with: set aside when a plan is merged for the

@@ -319,38 +319,44 @@ impl Plan {
         fs::create_dir_all(&own).map_err(ExportError::io(Action::CreateFolder, &own))
     }
 
-    /// Looks whether relative paths mean here what they meant where the plan was made: `here` is that folder, or there is the mark of
-    /// [`Plan::mark_place`] and one of the inputs. The same folder may have another name on another machine.
+    /// Looks whether paths mean here what they meant where the plan was made: `here` is that folder, or there is the mark of
+    /// [`Plan::mark_place`] and one of the inputs. The same folder may have another name on another machine, and a folder of the same name may be
+    /// empty there.
     ///
     /// # Errors
-    /// [`PlanError::Elsewhere`].
+    /// [`PlanError::Elsewhere`], [`PlanError::NothingHere`].
     pub fn check_place(&self, here: &Path) -> Result<(), PlanError> {
         let Header {
             folder, output, id, ..
         } = &self.header;
+        let mark = plan_folder(output, id);
+        let readable = self.assets.iter().map(|planned| &planned.task);
+        let mut readable = readable.filter(|task| task.input_hash.is_some());
         if here == folder {
-            return Ok(());
+            return match mark.is_dir() || readable.any(|task| task.path.exists()) {
+                true => Ok(()),
+                false => Err(PlanError::NothingHere {
+                    here: here.to_owned(),
+                    missing: mark,
+                }),
+            };
         }
-        let elsewhere = |missing: String| PlanError::Elsewhere {
+        let elsewhere = |missing: &Path| PlanError::Elsewhere {
             folder: folder.clone(),
             here: here.to_owned(),
-            missing,
+            missing: missing.to_owned(),
         };
-        let mark = plan_folder(output, id);
         if !mark.is_dir() {
-            return Err(elsewhere(mark.display().to_string()));
+            return Err(elsewhere(&mark));
         }
-        let mut relative = self.assets.iter().map(|asset| &asset.task);
-        let mut relative = relative
-            .by_ref()
-            .filter(|task| task.input_hash.is_some() && task.path.is_relative())
-            .map(|task| &task.path);
+        // Absolute ones tell nothing of this folder.
+        let mut relative = readable.filter(|task| task.path.is_relative());
         let Some(first) = relative.next() else {
             return Ok(());
         };
-        match first.exists() || relative.any(|path| path.exists()) {
+        match first.path.exists() || relative.any(|task| task.path.exists()) {
             true => Ok(()),
-            false => Err(elsewhere(first.display().to_string())),
+            false => Err(elsewhere(&first.path)),
         }
     }
 }

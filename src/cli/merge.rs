@@ -6,7 +6,7 @@ use super::exit;
 use super::problem::Problem;
 use super::run::read;
 use super::work::Work;
-use affine_atlas::batch::merge::{Merged, Went};
+use affine_atlas::batch::merge::{Merged, Went, is_gone};
 
 /// So many ids and shards are named in messages.
 const NAMED: usize = 5;
@@ -27,7 +27,10 @@ pub fn run(merge: &Merge, global: &Global, work: &Work) -> Result<u8, Problem> {
             missing: merged.missing.len(),
             all: plan.assets.len(),
             first: named(&merged.missing),
-            shards: shards(&merged),
+            shards: match is_gone(&plan) {
+                true => "what its shards wrote is gone; a later plan was merged, or .affine-atlas was removed".to_owned(),
+                false => shards(&merged),
+            },
             again: again(&merged, &merge.plan.display().to_string()),
         });
     }

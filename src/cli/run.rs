@@ -26,6 +26,9 @@ pub fn run(run: &Run, global: &Global, work: &Work) -> Result<u8, Problem> {
         }
         return Ok(exit::GOOD);
     }
+    // Before anything takes long: as the first process of a container this one has nobody else to end it.
+    let announce = !global.quiet && global.log_format == LogFormat::Text;
+    interrupt::install(work.remove_staging, announce);
     // Files may have changed since the plan was made; what counts is what is there.
     let tasks: Vec<Task> = planned
         .par_iter()
@@ -48,8 +51,6 @@ pub fn run(run: &Run, global: &Global, work: &Work) -> Result<u8, Problem> {
         header.total_memory,
         global,
     )?;
-    let announce = !global.quiet && global.log_format == LogFormat::Text;
-    interrupt::install(work.remove_staging, announce);
     let progress = Progress::new(global, tasks.len());
     let (outcomes, recorded) = (work.shard)(&batch, &header.id, run.shard, &tasks, &progress);
     progress.finish();

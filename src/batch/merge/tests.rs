@@ -205,6 +205,34 @@ fn records_of_another_plan_are_never_taken() {
 }
 
 #[test]
+fn plans_that_were_merged_are_cleared_up_by_later_ones() {
+    let root = Root::new();
+    let all = ["a000", "a001", "a002", "a003"].map(built);
+    root.attempt(Shard::WHOLE, &all, true);
+    root.merged().clear_up(&root.plan);
+    assert_eq!(root.merged().missing, [""; 0], "its own went too");
+    let half = plan(root.folder.path(), &[1, 1]);
+    let shard = |plan: &Plan, outcomes: &[AssetOutcome]| {
+        let id = &plan.header.id;
+        let mut recorder = ShardRecorder::begin(root.folder.path(), id, Shard::WHOLE).unwrap();
+        for (outcome, asset) in outcomes.iter().zip(&plan.assets) {
+            recorder.record(&asset.task, outcome);
+        }
+        recorder.finish().unwrap();
+    };
+    shard(&half, &all[..1]);
+    assert!(!is_gone(&root.plan));
+    collect(&half).unwrap().clear_up(&half);
+    assert!(is_gone(&root.plan) && !is_gone(&half));
+    // One that is not done stays, whatever is merged after it.
+    let last = plan(root.folder.path(), &[1]);
+    shard(&last, &all[..1]);
+    collect(&last).unwrap().clear_up(&last);
+    assert!(!is_gone(&half) && !is_gone(&last));
+    assert_eq!(collect(&half).unwrap().missing, ["a001"]);
+}
+
+#[test]
 fn the_history_of_the_run_before_is_set_aside_once() {
     let root = Root::new();
     let history = root.folder.path().join(HISTORY_NAME);

@@ -84,14 +84,22 @@ pub enum PlanError {
         stated: String,
     },
     /// The current folder is not the one in which it was made.
-    #[error("the plan was made in {}, and this is {}, from where {missing} is not to be seen", folder.display(), here.display())]
+    #[error("the plan was made in {}, and this is {}, from where {} is not to be seen", folder.display(), here.display(), missing.display())]
     Elsewhere {
         /// The plan's.
         folder: PathBuf,
         /// The current one.
         here: PathBuf,
         /// What.
-        missing: String,
+        missing: PathBuf,
+    },
+    /// The current folder has the name of the one in which it was made, and nothing of it.
+    #[error("nothing of the plan is to be seen from {}: {} is not there, nor any of the meshes", here.display(), missing.display())]
+    NothingHere {
+        /// The current folder.
+        here: PathBuf,
+        /// What should be there.
+        missing: PathBuf,
     },
 }
 
@@ -112,6 +120,9 @@ impl PlanError {
                 "copy it again, or plan again: what is built is not built again"
             }
             Self::OtherConfig { .. } => "plan again with this program",
+            Self::NothingHere { .. } => {
+                "mount the file system on which the plan was made on this machine, or plan again"
+            }
             Self::Elsewhere { .. } => {
                 "start it in the folder in which the plan was made, wherever that is mounted on this machine, or plan again"
             }

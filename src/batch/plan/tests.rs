@@ -271,6 +271,17 @@ fn a_plan_knows_its_place() {
     let here = folder.path();
     let elsewhere = tempfile::tempdir().unwrap();
     plan.check_place(here).unwrap();
+    let hidden = |from: &str, to: &str| fs::rename(here.join(from), here.join(to)).unwrap();
+    hidden("b.obj", "x");
+    plan.check_place(here).unwrap();
+    hidden("ä c.obj", "y");
+    let error = plan.check_place(here).unwrap_err();
+    assert!(matches!(error, PlanError::NothingHere { .. }), "{error}");
+    plan.mark_place().unwrap();
+    plan.check_place(here).unwrap();
+    fs::remove_dir_all(&plan.header.output).unwrap();
+    hidden("x", "b.obj");
+    hidden("y", "ä c.obj");
     // Nothing says that this is the same folder under another name.
     let error = plan.check_place(elsewhere.path()).unwrap_err();
     assert!(error.to_string().contains(&plan.header.id), "{error}");
