@@ -53,7 +53,7 @@ pub enum Line {
     /// The first.
     Plan(Header),
     /// Settings of assets, numbered from 0 in order.
-    Configuration(Configuration),
+    Configuration(Box<Configuration>),
     /// An asset.
     Asset(Box<PlannedLine>),
     /// The last.
@@ -287,7 +287,7 @@ impl Plan {
         };
         put(Line::Plan(self.header.clone()));
         for one in configurations {
-            put(Line::Configuration(one));
+            put(Line::Configuration(Box::new(one)));
         }
         for (planned, configuration) in self.assets.iter().zip(numbers) {
             let Planned {

@@ -43,7 +43,7 @@ impl Plan {
         let end = loop {
             match lines.next()? {
                 Line::Configuration(one) if assets.is_empty() => {
-                    configurations.push((lines.number, one));
+                    configurations.push((lines.number, *one));
                 }
                 Line::Asset(one) => assets.push((lines.number, *one)),
                 Line::End(end) => break end,
