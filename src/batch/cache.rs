@@ -178,6 +178,7 @@ pub fn check(output: &Path, task: &Task, last: Option<&Record>, demand: Demand<'
             outcome.state = AssetState::Cached;
             outcome.seconds = 0.0;
             outcome.peak_memory = None;
+            outcome.host = None;
             Verdict::Cached(Box::new(outcome))
         }
         Err(_) if demand.force => Verdict::Build(Reason::Forced),
@@ -405,14 +406,20 @@ mod tests {
     fn what_the_same_plan_has_built_counts_as_built() {
         let night = Night::new();
         let said = |force, plan| match night.check(Demand { force, plan }) {
-            Verdict::Cached(outcome) => (outcome.state_name().to_owned(), outcome.seconds),
+            Verdict::Cached(outcome) => {
+                let there = outcome.host.as_deref() == Some("there");
+                assert_eq!(outcome.state == AssetState::Built, there);
+                (outcome.state_name().to_owned(), outcome.seconds)
+            }
             Verdict::Build(reason) => (reason.to_string(), 0.0),
         };
         let is = |word: &str, seconds| (word.to_owned(), seconds);
+        let mut built = AssetOutcome::whole("a", AssetState::Built, 3.0);
+        built.host = Some("there".into());
         assert_eq!(said(false, Some("p")), is("cached", 0.0));
         assert_eq!(said(true, Some("p")), is("forced", 0.0));
         assert_eq!(said(true, None), is("forced", 0.0));
-        night.store_for(Some("p"), &AssetOutcome::whole("a", AssetState::Built, 3.0));
+        night.store_for(Some("p"), &built);
         assert_eq!(said(false, Some("p")), is("built", 3.0));
         assert_eq!(said(true, Some("p")), is("built", 3.0));
         assert_eq!(said(false, Some("q")), is("cached", 0.0));

@@ -62,10 +62,8 @@ pub fn collect(plan: &Plan) -> Result<Merged, ExportError> {
         let Some(&i) = place.get(finished.outcome.id.as_str()) else {
             return;
         };
-        let record = Record {
-            host: finished.host.clone(),
-            ..Record::of(&finished.outcome, &finished.config_hash)
-        };
+        let mut record = Record::of(&finished.outcome, &finished.config_hash);
+        record.host = record.host.or_else(|| finished.host.clone());
         // They are in the record.
         finished.outcome.files = Vec::new();
         let planned = plan.assets[i].task.input_hash.as_ref();

@@ -187,7 +187,7 @@ impl Purpose {
 }
 
 impl Plan {
-    /// Makes a plan of tasks and what the cache says of each.
+    /// Makes a plan of tasks and what the cache says of each, a verdict a task.
     ///
     /// # Errors
     /// [`PlanError::NotUnicode`].

@@ -122,6 +122,7 @@ pub fn work(job: &Job, path: &Path, output: &Path) -> AssetOutcome {
     told.leave();
     outcome.look_for_older(output);
     outcome.peak_memory = limits::peak_memory();
+    outcome.host = limits::host();
     let after = read::fingerprint(path).ok();
     match (before, after) {
         (Some(before), Some(after)) if before == after => {

@@ -95,7 +95,9 @@ fn failed(id: &str) -> AssetOutcome {
 fn what_all_shards_did_is_the_manifest_in_the_order_of_the_plan() {
     let root = Root::new();
     root.attempt(HALVES[1], &[failed("a002"), built("a001")], true);
-    root.attempt(HALVES[0], &[built("a003"), built("a000")], true);
+    let mut elsewhere = built("a003");
+    elsewhere.host = Some("elsewhere".into());
+    root.attempt(HALVES[0], &[elsewhere, built("a000")], true);
     let merged = root.merged();
     let ids: Vec<&str> = merged.outcomes.iter().map(|o| o.id.as_str()).collect();
     assert_eq!(ids, ["a000", "a001", "a002", "a003"]);
@@ -113,6 +115,9 @@ fn what_all_shards_did_is_the_manifest_in_the_order_of_the_plan() {
     let mut expected = Record::of(&built("a000"), &root.plan.assets[0].task.config_hash);
     expected.host = crate::batch::limits::host();
     assert_eq!(manifest.get("a000"), Some(&expected));
+    // What an earlier attempt built keeps the name of that machine.
+    let host = &manifest.get("a003").unwrap().host;
+    assert_eq!(host.as_deref(), Some("elsewhere"));
     assert_eq!(expected.files, ["a000/atlas.json"]);
     let text = manifest.to_text();
     root.merged().save(&root.plan).unwrap();

@@ -105,7 +105,7 @@ impl Recorder {
 
     /// Writes down one record.
     fn put(&mut self, mut record: Record) {
-        record.host.clone_from(&self.host);
+        record.host = record.host.or_else(|| self.host.clone());
         if let Some((file, path)) = &mut self.journal
             && let Ok(mut line) = serde_json::to_vec(&record)
         {

@@ -49,7 +49,7 @@ pub struct Finished {
     pub input_hash: Option<String>,
     /// [`Task::config_hash`].
     pub config_hash: String,
-    /// Name of the machine, where it has one.
+    /// Name of the machine that says so, where it has one.
     pub host: Option<String>,
     /// What became of it, with all of its files.
     pub outcome: AssetOutcome,
