@@ -9,7 +9,8 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// What is to be done for one asset, as a line of a plan. Everything but `settings` is in it; these are known by their hash.
+/// What is to be done for one asset, as a line of a [plan](super::plan). Everything but `settings` is in it: these stand in a line of their own,
+/// for all assets that have the same.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Task {
     /// Name of the asset and of its folder.
