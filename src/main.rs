@@ -6,12 +6,15 @@
 mod cli;
 
 use affine_atlas::batch::cache::Verdict;
+use affine_atlas::batch::merge::{self, Merged};
+use affine_atlas::batch::plan::Plan;
+use affine_atlas::batch::shard::Shard;
 use affine_atlas::batch::{self, Batch, Task, Watcher};
 use affine_atlas::config::Config;
 use affine_atlas::config::assets::Asset;
 use affine_atlas::export::folder::remove_all_staging;
-use affine_atlas::export::index;
 use affine_atlas::export::manifest::Manifest;
+use affine_atlas::export::{ExportError, index};
 use affine_atlas::job::fit::FitParams;
 use affine_atlas::job::rebuild::RebuildAssetError;
 use affine_atlas::job::survey::folder_name as survey_folder;
@@ -30,6 +33,9 @@ use std::process::ExitCode;
 /// The one place where the command meets the library.
 const WORK: Work = Work {
     batch,
+    shard,
+    collect,
+    merge,
     decide,
     work: batch::worker::work,
     inspect,
@@ -51,8 +57,38 @@ fn batch(batch: &Batch<'_>, tasks: &[Task], watcher: &dyn Watcher) -> Recorded {
     let (outcomes, recorded) = batch::run(batch, tasks, watcher);
     let page = || index::write(batch.output, &Manifest::load(batch.output)?.0);
     let recorded = recorded.and_then(|()| page());
-    let recorded = recorded.map_err(|error| Failure::from(&BuildError::Export(error)));
-    (outcomes, recorded)
+    (outcomes, recorded.map_err(failure))
+}
+
+fn shard(
+    batch: &Batch<'_>,
+    plan: &str,
+    shard: Shard,
+    tasks: &[Task],
+    watcher: &dyn Watcher,
+) -> Recorded {
+    let (outcomes, recorded) = batch::run_shard(batch, plan, shard, tasks, watcher);
+    (outcomes, recorded.map_err(failure))
+}
+
+fn collect(plan: &Plan) -> Result<Merged, Failure> {
+    merge::collect(plan).map_err(failure)
+}
+
+fn merge(plan: &Plan, merged: &Merged) -> Result<(), Failure> {
+    let write = || {
+        let before = merge::history_before(plan)?;
+        merged.save(plan)?;
+        let output = &plan.header.output;
+        index::write_against(output, &Manifest::load(output)?.0, &before)?;
+        merged.clear_up(plan);
+        Ok(())
+    };
+    write().map_err(failure)
+}
+
+fn failure(error: ExportError) -> Failure {
+    Failure::from(&BuildError::Export(error))
 }
 
 fn decide(batch: &Batch<'_>, tasks: &[Task]) -> Vec<Verdict> {
@@ -69,7 +105,7 @@ fn remove_staging() {
 fn inspect(asset: &Asset, config: &Config) -> Result<Inspection, Failure> {
     let inspection = job::inspect(&asset.path, config).map_err(|e| Failure::from(&e))?;
     let region = inspection.region_glb().transpose();
-    let region = region.map_err(|e| Failure::from(&BuildError::Export(e)))?;
+    let region = region.map_err(failure)?;
     Ok(Inspection {
         region,
         text: inspection.to_string(),
@@ -174,7 +210,7 @@ fn explain(request: &ExplainRequest) -> Result<Explained, Failure> {
     let said = job::explain::asset(&request.asset, &request.config)?;
     let glb = said.glb().transpose();
     Ok(Explained {
-        glb: glb.map_err(|e| Failure::from(&BuildError::Export(e)))?,
+        glb: glb.map_err(failure)?,
         failed: said.failed(),
         text: said.to_string(),
     })

@@ -135,6 +135,9 @@ pub struct AssetOutcome {
     /// Most memory that the asset's process held, bytes; absent where the system does not tell, or nothing was computed.
     #[serde(default)]
     pub peak_memory: Option<u64>,
+    /// Name of the machine whose worker said this; absent where nothing was computed, or the machine has no name.
+    #[serde(default)]
+    pub host: Option<String>,
     /// Whether nothing was built but the result of an earlier run is still in place.
     #[serde(default)]
     pub kept: bool,
@@ -153,6 +156,7 @@ impl AssetOutcome {
             input_hash: None,
             notes: Vec::new(),
             peak_memory: None,
+            host: None,
             kept: false,
         }
     }

@@ -3,6 +3,9 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
+#[path = "cli_messages/plans.rs"]
+mod plans;
+
 /// Runs the command in a folder, as if its output went to a file.
 fn run(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_affine-atlas"))
@@ -442,6 +445,10 @@ fn wrong_arguments_exit_with_2_and_help_with_0() {
             "--tile-size",
             "2",
         ],
+        &["plan", "a.obj"],
+        &["plan", "a.obj", "-p", "p", "--shards", "0"],
+        &["run", "-p", "p", "--shard", "0/3"],
+        &["merge"],
         &["build", "-q", "-v"],
     ] {
         assert_eq!(
@@ -469,7 +476,7 @@ fn schema_and_explain_refuse_what_they_do_not_know() {
     let folder = folder();
     insta::assert_snapshot!(refusal(folder.path(), &["schema", "glb"], 2), @r"
     error: invalid value 'glb' for '<FILE>'
-      [possible values: atlas, manifest, config]
+      [possible values: atlas, manifest, config, plan]
 
     For more information, try '--help'.
     ");
@@ -511,6 +518,9 @@ fn help() {
 
     Commands:
       build    Build an atlas of each mesh
+      plan     Write down what a build would do, for several machines
+      run      Build one shard of a plan
+      merge    Put what all shards of a plan built together, as one build
       check    Say what a build would do, and build nothing
       cones    Show what more or fewer cones gain, and write lists of them
       verify   Read atlases back and check every property they must have
@@ -539,7 +549,7 @@ fn help() {
         2  wrong arguments or configuration
         3  nothing to do
         4  an error of this program
-      130  stopped by Ctrl-C
+      130  stopped by Ctrl-C or SIGTERM
     ");
     insta::assert_snapshot!(stdout(&run(folder.path(), &["build", "-h"])), @r"
     Build an atlas of each mesh
@@ -585,6 +595,99 @@ fn help() {
     mesh, settings and version are the same as last time and the folder is whole, nothing is built. OUT
     also gets manifest.jsonl and junit.xml (what became of each mesh), index.html (the same to look at)
     and logs/NAME.log.
+    ");
+    insta::assert_snapshot!(stdout(&run(folder.path(), &["plan", "-h"])), @r"
+    Write down what a build would do, for several machines
+
+    Usage: affine-atlas plan [OPTIONS] --plan <PLAN.jsonl> [CONFIG|MESH]...
+
+    Arguments:
+      [CONFIG|MESH]...  A configuration (ends in .toml), meshes (glTF, GLB, OBJ, PLY, STL, OFF), or
+                        both: meshes then take the place of `input.paths`. Folders, globs and `@LIST`, a
+                        text file with one of all these a line, stand for the meshes that are found
+                        [default: config.toml]
+
+    Options:
+          --set <KEY=VALUE>      Set a key of the configuration, for example `flow.scheme=thurston`; may
+                                 be repeated
+      -o, --out <DIR>            Folder for the atlases [default: output.folder of the configuration, or
+                                 affine-atlas-out]
+      -f, --force                Build also what is there, whole, and of the same mesh, settings and
+                                 version
+          --shards <N>           Say how even so many shards would be
+      -p, --plan <PLAN.jsonl>    File to write, replacing an older one
+      -q, --quiet                Show errors only
+      -v, --verbose...           Show each step; twice: everything
+          --log-format <FORMAT>  Progress and errors as text, or as one JSON object a line (both on
+                                 standard error) [default: text] [possible values: text, json]
+          --threads <N>          Threads to use, in `build` for each mesh; 0 takes one for each core,
+                                 shared by the meshes that are built at the same time [default:
+                                 run.threads of the configuration]
+      -h, --help                 Print help (see more with '--help')
+
+    Examples:
+      affine-atlas plan my.toml --out atlases --plan night.jsonl --shards 16
+      affine-atlas run --plan night.jsonl --shard 1/16       to 16/16, on any machines, in any order
+      affine-atlas merge --plan night.jsonl
+
+    Machines need a common file system with the meshes and OUT, and the same version of this program.
+    Relative paths start at the folder in which the plan is made: start all three there. Shards are of
+    about the same expected time; how many there are is chosen with `run`, and --shards only shows what
+    it comes to. The plan holds all settings: no configuration is read again.
+    ");
+    insta::assert_snapshot!(stdout(&run(folder.path(), &["run", "-h"])), @r"
+    Build one shard of a plan
+
+    Usage: affine-atlas run [OPTIONS] --plan <PLAN.jsonl>
+
+    Options:
+      -p, --plan <PLAN.jsonl>    File that `affine-atlas plan` wrote
+      -s, --shard <I/N>          Which part, from 1, and of how many [default: 1/1]
+      -j, --jobs <N>             Meshes to build at the same time; 0 takes one for each core [default:
+                                 run.jobs of the configuration]
+      -q, --quiet                Show errors only
+      -v, --verbose...           Show each step; twice: everything
+          --log-format <FORMAT>  Progress and errors as text, or as one JSON object a line (both on
+                                 standard error) [default: text] [possible values: text, json]
+          --threads <N>          Threads to use, in `build` for each mesh; 0 takes one for each core,
+                                 shared by the meshes that are built at the same time [default:
+                                 run.threads of the configuration]
+      -h, --help                 Print help (see more with '--help')
+
+    Examples:
+      affine-atlas run --plan night.jsonl --shard 3/16
+      affine-atlas run --plan night.jsonl --shard $SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT
+      affine-atlas run --plan night.jsonl                    all of it
+
+    May be run again at any time, after a kill or by an engine that is not sure: what this plan has
+    built is not built again, and reported as before. A request to stop (SIGTERM, Ctrl-C) ends it within
+    seconds. Exit codes are those of a build of these meshes; a shard without meshes is good.
+    ");
+    insta::assert_snapshot!(stdout(&run(folder.path(), &["merge", "-h"])), @r"
+    Put what all shards of a plan built together, as one build
+
+    Usage: affine-atlas merge [OPTIONS] --plan <PLAN.jsonl>
+
+    Options:
+      -p, --plan <PLAN.jsonl>    File that `affine-atlas plan` wrote
+          --incomplete           Record meshes that are not done as cancelled instead of refusing
+          --depfile <FILE>       Write for Make and Ninja which files OUT/manifest.jsonl was made from
+      -q, --quiet                Show errors only
+      -v, --verbose...           Show each step; twice: everything
+          --log-format <FORMAT>  Progress and errors as text, or as one JSON object a line (both on
+                                 standard error) [default: text] [possible values: text, json]
+          --threads <N>          Threads to use, in `build` for each mesh; 0 takes one for each core,
+                                 shared by the meshes that are built at the same time [default:
+                                 run.threads of the configuration]
+      -h, --help                 Print help (see more with '--help')
+
+    Examples:
+      affine-atlas merge --plan night.jsonl
+      affine-atlas merge --plan night.jsonl --incomplete     also while some are not done
+
+    Writes manifest.jsonl, junit.xml and index.html of OUT as one build of all meshes would have, and
+    gives its exit code. Where a mesh is not done nothing is written, and the shards that it belongs to
+    are named: exit code 1. With --incomplete it is recorded as cancelled: exit code 130.
     ");
     insta::assert_snapshot!(stdout(&run(folder.path(), &["cones", "-h"])), @r"
     Show what more or fewer cones gain, and write lists of them

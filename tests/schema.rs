@@ -169,6 +169,72 @@ fn what_is_written_is_valid_and_what_is_broken_is_not() {
 }
 
 #[test]
+fn plans_are_valid_and_broken_ones_are_not() {
+    let validator = validator("plan");
+    let root = tempfile::tempdir().expect("a folder");
+    let path = root.path().join("plan.jsonl");
+    let output = program()
+        .args(["plan", "fixtures/good", "fixtures/bad", "--out"])
+        .arg(root.path().join("out"))
+        .args(["--set", "cones.list=[{ vertex = 0, curvature = \"1/2\" }]"])
+        .arg("--plan")
+        .arg(&path)
+        .output()
+        .expect("it runs");
+    assert!(output.status.success());
+    let text = std::fs::read_to_string(&path).expect("written");
+    let lines: Vec<Value> = text
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("JSON"))
+        .collect();
+    assert!(lines.len() > 40, "{} lines", lines.len());
+    for (i, line) in lines.iter().enumerate() {
+        assert_valid(&validator, line, &format!("line {}", i + 1));
+    }
+    let first = |record: &str| {
+        lines
+            .iter()
+            .find(|line| line["record"] == record)
+            .expect(record)
+    };
+    assert_refused(
+        &validator,
+        first("plan"),
+        &[
+            ("/record", Some(json!("plot"))),
+            ("/format", Some(json!("another"))),
+            ("/version", Some(json!(2))),
+            ("/id", None),
+            ("/folder", Some(json!(1))),
+            ("/force", Some(json!("no"))),
+        ],
+    );
+    assert_refused(
+        &validator,
+        first("configuration"),
+        &[
+            ("/config", None),
+            ("/config", Some(json!("defaults"))),
+            ("/cone_lines", Some(json!([-1]))),
+        ],
+    );
+    assert_refused(
+        &validator,
+        first("asset"),
+        &[
+            ("/id", None),
+            ("/path", None),
+            ("/files", Some(json!("a.obj"))),
+            ("/cost", Some(json!(-1))),
+            ("/decision", Some(json!("perhaps"))),
+            ("/estimate", Some(json!(0.5))),
+            ("/configuration", None),
+        ],
+    );
+    assert_refused(&validator, first("end"), &[("/blake3", None)]);
+}
+
+#[test]
 fn configurations_are_valid_and_broken_ones_are_not() {
     let config = validator("config");
     let read = |text: &str| -> Value {

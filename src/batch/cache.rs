@@ -32,6 +32,9 @@ pub struct Entry {
     pub input_hash: String,
     /// [`Config::flat`](crate::config::Config::flat).
     pub config: BTreeMap<String, Value>,
+    /// [`Plan`](super::plan::Plan) by which it was built, where there was one.
+    #[serde(default)]
+    pub plan: Option<String>,
     /// The asset's files.
     pub outputs: Vec<Output>,
     /// What the build said.
@@ -49,10 +52,19 @@ pub struct Output {
     pub blake3: String,
 }
 
+/// What counts as done.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Demand<'a> {
+    /// Nothing that was there before; only what the same plan has built.
+    pub force: bool,
+    /// The plan that is carried out, by its id.
+    pub plan: Option<&'a str>,
+}
+
 /// Whether an asset must be built.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Verdict {
-    /// No: what an earlier run said of it.
+    /// No: what an earlier run said of it. It counts as built where that was an earlier attempt at the same plan.
     Cached(Box<AssetOutcome>),
     /// Yes, and why.
     Build(Reason),
@@ -150,14 +162,31 @@ fn entry_path(output: &Path, id: &str) -> PathBuf {
 
 /// Looks whether an asset must be built into `output`. `last` is what the manifest says of it.
 #[must_use]
-pub fn check(output: &Path, task: &Task, last: Option<&Record>) -> Verdict {
+pub fn check(output: &Path, task: &Task, last: Option<&Record>, demand: Demand<'_>) -> Verdict {
+    if demand.force && demand.plan.is_none() {
+        return Verdict::Build(Reason::Forced);
+    }
     match look(output, task, last) {
-        Ok(outcome) => Verdict::Cached(Box::new(outcome)),
+        Ok(entry) => {
+            let mut outcome = entry.outcome;
+            if demand.plan.is_some() && entry.plan.as_deref() == demand.plan {
+                return Verdict::Cached(Box::new(outcome));
+            }
+            if demand.force {
+                return Verdict::Build(Reason::Forced);
+            }
+            outcome.state = AssetState::Cached;
+            outcome.seconds = 0.0;
+            outcome.peak_memory = None;
+            outcome.host = None;
+            Verdict::Cached(Box::new(outcome))
+        }
+        Err(_) if demand.force => Verdict::Build(Reason::Forced),
         Err(reason) => Verdict::Build(reason),
     }
 }
 
-fn look(output: &Path, task: &Task, last: Option<&Record>) -> Result<AssetOutcome, Reason> {
+fn look(output: &Path, task: &Task, last: Option<&Record>) -> Result<Entry, Reason> {
     let bytes = match fs::read(entry_path(output, &task.id)) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
@@ -189,11 +218,7 @@ fn look(output: &Path, task: &Task, last: Option<&Record>) -> Result<AssetOutcom
     for written in &entry.outputs {
         whole(&folder, written)?;
     }
-    let mut outcome = entry.outcome;
-    outcome.state = AssetState::Cached;
-    outcome.seconds = 0.0;
-    outcome.peak_memory = None;
-    Ok(outcome)
+    Ok(entry)
 }
 
 /// The first key whose value differs.
@@ -246,7 +271,7 @@ fn parse(bytes: &[u8]) -> Option<Entry> {
     serde_json::from_str(entry).ok()
 }
 
-/// Writes the entry of an asset whose folder is in place. A result with a failed component leaves none.
+/// Writes the entry of an asset whose folder is in place, built by a plan or not. A result with a failed component leaves none.
 ///
 /// # Errors
 /// Where outputs cannot be read back, or the entry cannot be written; the asset is built all the same.
@@ -254,6 +279,7 @@ pub fn store(
     output: &Path,
     input_hash: &str,
     config: BTreeMap<String, Value>,
+    plan: Option<&str>,
     outcome: &AssetOutcome,
 ) -> Result<(), ExportError> {
     if outcome.state_name() != "built" {
@@ -275,6 +301,7 @@ pub fn store(
         version: VERSION.to_owned(),
         input_hash: input_hash.to_owned(),
         config,
+        plan: plan.map(str::to_owned),
         outputs,
         outcome: outcome.clone(),
     };
@@ -324,11 +351,16 @@ mod tests {
         }
 
         fn store(&self, outcome: &AssetOutcome) {
+            self.store_for(None, outcome);
+        }
+
+        fn store_for(&self, plan: Option<&str>, outcome: &AssetOutcome) {
             let hash = self.task.input_hash.clone().unwrap();
             store(
                 self.root.path(),
                 &hash,
                 self.task.settings.flat.clone(),
+                plan,
                 outcome,
             )
             .unwrap();
@@ -338,8 +370,12 @@ mod tests {
             entry_path(self.root.path(), "a")
         }
 
+        fn check(&self, demand: Demand<'_>) -> Verdict {
+            check(self.root.path(), &self.task, None, demand)
+        }
+
         fn reason(&self) -> String {
-            match check(self.root.path(), &self.task, None) {
+            match self.check(Demand::default()) {
                 Verdict::Build(reason) => reason.to_string(),
                 Verdict::Cached(_) => "cached".to_owned(),
             }
@@ -358,12 +394,41 @@ mod tests {
     #[test]
     fn an_asset_that_is_whole_is_cached() {
         let night = Night::new();
-        let Verdict::Cached(outcome) = check(night.root.path(), &night.task, None) else {
+        let Verdict::Cached(outcome) = night.check(Demand::default()) else {
             panic!("{}", night.reason());
         };
         assert_eq!((outcome.state_name(), outcome.seconds), ("cached", 0.0));
         fs::write(night.root.path().join("a/notes.txt"), "mine").unwrap();
         assert_eq!(night.reason(), "cached");
+    }
+
+    #[test]
+    fn what_the_same_plan_has_built_counts_as_built() {
+        let night = Night::new();
+        let said = |force, plan| match night.check(Demand { force, plan }) {
+            Verdict::Cached(outcome) => {
+                let there = outcome.host.as_deref() == Some("there");
+                assert_eq!(outcome.state == AssetState::Built, there);
+                (outcome.state_name().to_owned(), outcome.seconds)
+            }
+            Verdict::Build(reason) => (reason.to_string(), 0.0),
+        };
+        let is = |word: &str, seconds| (word.to_owned(), seconds);
+        let mut built = AssetOutcome::whole("a", AssetState::Built, 3.0);
+        built.host = Some("there".into());
+        assert_eq!(said(false, Some("p")), is("cached", 0.0));
+        assert_eq!(said(true, Some("p")), is("forced", 0.0));
+        assert_eq!(said(true, None), is("forced", 0.0));
+        night.store_for(Some("p"), &built);
+        assert_eq!(said(false, Some("p")), is("built", 3.0));
+        assert_eq!(said(true, Some("p")), is("built", 3.0));
+        assert_eq!(said(false, Some("q")), is("cached", 0.0));
+        assert_eq!(said(true, Some("q")), is("forced", 0.0));
+        assert_eq!(said(false, None), is("cached", 0.0));
+        // Not where it is no more what was built.
+        fs::write(night.root.path().join("a/atlas.json"), "[]").unwrap();
+        assert_eq!(said(false, Some("p")).0, "outputs damaged: atlas.json");
+        assert_eq!(said(true, Some("p")).0, "forced");
     }
 
     #[test]
@@ -386,7 +451,7 @@ mod tests {
 
         let night = Night::new();
         let other = night.with_config(|config| config.cones.count = Some(6));
-        let verdict = check(night.root.path(), &other.task, None);
+        let verdict = check(night.root.path(), &other.task, None, Demand::default());
         let Verdict::Build(reason) = verdict else {
             panic!("cached")
         };
@@ -399,7 +464,7 @@ mod tests {
             config.patches.padding = 7;
             config.run.threads = 3;
         });
-        let verdict = check(night.root.path(), &other.task, None);
+        let verdict = check(night.root.path(), &other.task, None, Demand::default());
         let Verdict::Build(reason) = verdict else {
             panic!("cached")
         };
@@ -441,7 +506,12 @@ mod tests {
         night.store(&failed);
         assert_eq!(night.reason(), "new");
         let record = Record::of(&failed, "");
-        let verdict = check(night.root.path(), &night.task, Some(&record));
+        let verdict = check(
+            night.root.path(),
+            &night.task,
+            Some(&record),
+            Demand::default(),
+        );
         assert_eq!(verdict, Verdict::Build(Reason::FailedLastTime));
     }
 }

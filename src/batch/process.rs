@@ -23,6 +23,8 @@ pub struct Start<'a> {
     pub arguments: &'a [&'a str],
     /// The output root.
     pub output: &'a Path,
+    /// The plan that is carried out, by its id.
+    pub plan: Option<&'a str>,
     /// Threads of the worker, at least 1.
     pub threads: usize,
     /// How it speaks.
@@ -89,6 +91,7 @@ impl Process {
             cone_lines: config.cones.file_lines.clone(),
             threads: start.threads,
             memory: config.run.memory,
+            plan: start.plan.map(str::to_owned),
             parent: std::process::id(),
             voice: start.voice,
         };
@@ -211,9 +214,10 @@ impl Process {
         }
     }
 
-    /// What became of the asset. Waits for the process, whose outputs have ended. The flag says whether it ended in good order, so
+    /// What became of the asset. Waits for the process, whose outputs have ended. `stopping` says whether the whole run is being
+    /// stopped, and is asked only where somebody else asked this process to end. The flag says whether it ended in good order, so
     /// that nothing of it can be left behind.
-    pub fn conclude(mut self, output: &Path) -> (AssetOutcome, bool) {
+    pub fn conclude(mut self, output: &Path, stopping: &dyn Fn() -> bool) -> (AssetOutcome, bool) {
         let status = self.child.wait();
         let seconds = self.started.elapsed().as_secs_f64();
         if let Some(outcome) = self.outcome.take() {
@@ -222,6 +226,7 @@ impl Process {
         let state = match self.ended_by_us {
             Some(End::Cancelled) => AssetState::Cancelled,
             Some(End::Timeout) => AssetState::Failed(self.took_too_long()),
+            None if asked_to_end(status.as_ref().ok()) && stopping() => AssetState::Cancelled,
             None => AssetState::Failed(self.crashed(status.ok())),
         };
         let mut outcome = AssetOutcome::whole(&self.id, state, seconds);
@@ -307,6 +312,14 @@ fn no_memory(message: String) -> Failure {
         kind: FailureKind::Memory,
         message,
     }
+}
+
+/// Whether a signal asked it to end that is no crash: hang up, interrupt, terminate.
+fn asked_to_end(status: Option<&ExitStatus>) -> bool {
+    matches!(
+        status.and_then(|&status| signal_of(status)),
+        Some(1 | 2 | 15)
+    )
 }
 
 #[cfg(unix)]

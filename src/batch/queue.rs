@@ -6,15 +6,16 @@
 //! One thread starts all workers, listens to all of them and waits for them: they die with that thread. What it holds of an asset that is done is
 //! its outcome without its list of files.
 
-use super::cache::{self, Reason, Verdict};
+use super::cache::{self, Demand, Verdict};
 use super::process::{End, Message, Process, Start};
-use super::records::Recorder;
+use super::records::{Recorder, Recording, ShardRecorder};
+use super::shard::Shard;
 use super::task::Task;
 use super::worker::{Event, Voice};
 use super::{limits, log_path};
 use crate::export::ExportError;
 use crate::export::folder::{mark_swept, sweep_stale};
-use crate::export::manifest::{Manifest, Record};
+use crate::export::manifest::Manifest;
 use crate::outcome::{AssetOutcome, AssetState, Failure, FailureKind};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -30,6 +31,8 @@ const GLANCE: Duration = Duration::from_millis(50);
 const PART: usize = 128;
 /// Time that workers get to clear up when the run is stopped.
 const PATIENCE: Duration = Duration::from_secs(4);
+/// An engine that stops a run may signal this process and its workers alike: the request may come so much later than a worker's end.
+const TOGETHER: Duration = Duration::from_millis(300);
 
 /// Where and how tasks are done.
 #[derive(Clone, Debug)]
@@ -42,6 +45,8 @@ pub struct Batch<'a> {
     pub arguments: &'a [&'a str],
     /// Build also what is whole.
     pub force: bool,
+    /// The plan that is carried out, by its id: what it has built is not built again, also with `force`.
+    pub plan: Option<&'a str>,
     /// Most workers at a time; 0: one a core.
     pub jobs: usize,
     /// Memory of all workers together, bytes; 0: what the machine has left when the run begins.
@@ -73,15 +78,16 @@ impl Watcher for () {}
 /// Looks what must be built, without building it: a verdict a task.
 #[must_use]
 pub fn decide(batch: &Batch<'_>, tasks: &[Task], known: &Manifest) -> Vec<Verdict> {
-    let look = |task: &Task| match batch.force {
-        true => Verdict::Build(Reason::Forced),
-        false => cache::check(batch.output, task, known.get(&task.id)),
+    let demand = Demand {
+        force: batch.force,
+        plan: batch.plan,
     };
+    let look = |task: &Task| cache::check(batch.output, task, known.get(&task.id), demand);
     tasks.par_iter().map(look).collect()
 }
 
-/// Does all tasks, each in a process of its own, and writes down what became of them. To be called from a thread that lives until the
-/// program ends.
+/// Does all tasks, each in a process of its own, and writes down in the manifest what became of them. To be called from a thread that
+/// lives until the program ends.
 ///
 /// # Errors
 /// Where the output root cannot be written, then nothing was done; or the manifest cannot, then outcomes are there all the same.
@@ -90,11 +96,47 @@ pub fn run(
     tasks: &[Task],
     watcher: &dyn Watcher,
 ) -> (Vec<AssetOutcome>, Result<(), ExportError>) {
-    let mut recorder = match Recorder::begin(batch.output) {
-        Ok(recorder) => recorder,
+    match Recorder::begin(batch.output) {
+        Ok(mut recorder) => {
+            let outcomes = do_all(batch, tasks, watcher, &mut recorder);
+            (outcomes, recorder.finish())
+        }
         // Where this cannot be written no atlas can: thousands of them need not be computed to find out.
-        Err(error) => return (Vec::new(), Err(error)),
+        Err(error) => (Vec::new(), Err(error)),
+    }
+}
+
+/// The same for a shard of a plan, whose tasks these are: what became of them is written into a file of its own, for
+/// [`merge`](super::merge).
+///
+/// # Errors
+/// As [`run`], for that file in place of the manifest.
+pub fn run_shard(
+    batch: &Batch<'_>,
+    plan: &str,
+    shard: Shard,
+    tasks: &[Task],
+    watcher: &dyn Watcher,
+) -> (Vec<AssetOutcome>, Result<(), ExportError>) {
+    let batch = Batch {
+        plan: Some(plan),
+        ..batch.clone()
     };
+    match ShardRecorder::begin(batch.output, plan, shard) {
+        Ok(mut recorder) => {
+            let outcomes = do_all(&batch, tasks, watcher, &mut recorder);
+            (outcomes, recorder.finish())
+        }
+        Err(error) => (Vec::new(), Err(error)),
+    }
+}
+
+fn do_all(
+    batch: &Batch<'_>,
+    tasks: &[Task],
+    watcher: &dyn Watcher,
+    recorder: &mut dyn Recording,
+) -> Vec<AssetOutcome> {
     if let Err(error) = sweep_stale(batch.output) {
         tracing::debug!(%error, "nothing to clear up");
     }
@@ -121,7 +163,7 @@ pub fn run(
         let verdicts = decide(batch, some, &Manifest::default());
         for (number, verdict) in (part * PART..).zip(verdicts) {
             match verdict {
-                Verdict::Cached(outcome) => queue.done(number, *outcome, &mut recorder),
+                Verdict::Cached(outcome) => queue.done(number, *outcome, recorder),
                 Verdict::Build(_) => to_build.push(number),
             }
         }
@@ -138,12 +180,11 @@ pub fn run(
         bytes => bytes,
     };
     queue.waiting = to_build.into();
-    queue.work(&receiver, &mut recorder);
+    queue.work(&receiver, recorder);
     let missing = |task: &Task| AssetOutcome::whole(&task.id, AssetState::Cancelled, 0.0);
     let outcomes = queue.outcomes.into_iter().zip(tasks);
     let outcomes = outcomes.map(|(outcome, task)| outcome.unwrap_or_else(|| missing(task)));
-    let outcomes = outcomes.collect();
-    (outcomes, recorder.finish())
+    outcomes.collect()
 }
 
 struct Queue<'a> {
@@ -159,7 +200,7 @@ struct Queue<'a> {
 }
 
 impl Queue<'_> {
-    fn work(&mut self, receiver: &Receiver<Message>, recorder: &mut Recorder) {
+    fn work(&mut self, receiver: &Receiver<Message>, recorder: &mut dyn Recording) {
         let mut stopping: Option<Instant> = None;
         loop {
             if stopping.is_none() && self.watcher.cancelled() {
@@ -230,7 +271,7 @@ impl Queue<'_> {
             && taken.saturating_add(self.tasks[next].memory()) <= self.budget
     }
 
-    fn start_next(&mut self, recorder: &mut Recorder) {
+    fn start_next(&mut self, recorder: &mut dyn Recording) {
         let Some(number) = self.waiting.pop_front() else {
             return;
         };
@@ -247,6 +288,7 @@ impl Queue<'_> {
             program: &self.batch.program,
             arguments: self.batch.arguments,
             output: self.batch.output,
+            plan: self.batch.plan,
             threads,
             voice: self.batch.voice,
         };
@@ -272,9 +314,19 @@ impl Queue<'_> {
         }
     }
 
-    fn conclude(&mut self, number: usize, process: Process, recorder: &mut Recorder) {
+    fn conclude(&mut self, number: usize, process: Process, recorder: &mut dyn Recording) {
         let worker = process.number();
-        let (outcome, in_order) = process.conclude(self.batch.output);
+        let stopping = || {
+            let since = Instant::now();
+            while !self.watcher.cancelled() {
+                if since.elapsed() > TOGETHER {
+                    return false;
+                }
+                std::thread::sleep(GLANCE / 10);
+            }
+            true
+        };
+        let (outcome, in_order) = process.conclude(self.batch.output, &stopping);
         WORKERS
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
@@ -307,9 +359,9 @@ impl Queue<'_> {
         let _ = file.and_then(|mut file| file.write_all(format!("{line}\n").as_bytes()));
     }
 
-    fn done(&mut self, number: usize, mut outcome: AssetOutcome, recorder: &mut Recorder) {
+    fn done(&mut self, number: usize, mut outcome: AssetOutcome, recorder: &mut dyn Recording) {
         let task = &self.tasks[number];
-        recorder.record(Record::of(&outcome, &task.config_hash));
+        recorder.record(task, &outcome);
         self.watcher.finished(number, &outcome);
         // They are written down; thousands of assets would fill memory with them.
         outcome.files = Vec::new();

@@ -9,8 +9,9 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// What is to be done for one asset, as a line of a plan. Everything but `settings` is in it; these are known by their hash.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// What is to be done for one asset, as a line of a [plan](super::plan). Everything but `settings` is in it: these stand in a line of their own,
+/// for all assets that have the same.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Task {
     /// Name of the asset and of its folder.
     pub id: String,
@@ -69,6 +70,17 @@ impl Task {
             files: found.map_or_else(|| vec![asset.path.clone()], |found| found.files),
             settings: Arc::clone(settings),
         }
+    }
+
+    /// The same, with a new look at its files.
+    #[must_use]
+    pub fn looked_at_again(&self) -> Self {
+        let asset = Asset {
+            id: self.id.clone(),
+            path: self.path.clone(),
+            given: self.given.clone(),
+        };
+        Self::new(&asset, &self.settings)
     }
 
     /// Most memory that building it is expected to take, bytes; see [`limits::estimate`](super::limits::estimate).

@@ -1,9 +1,12 @@
 //! The queue with workers that only pretend, written as shell scripts.
 #![cfg(unix)]
 
+use super::process::{Message, Process, Start};
+use super::records::shard::read;
+use super::shard::Shard;
 use super::task::Settings;
 use super::worker::Voice;
-use super::{Batch, Task, Watcher, run};
+use super::{Batch, Task, Watcher, run, run_shard};
 use crate::config::Config;
 use crate::outcome::{AssetOutcome, AssetState, FailureKind};
 use std::fs;
@@ -52,6 +55,7 @@ fn play(
         program: "/bin/sh".into(),
         arguments: &arguments,
         force: false,
+        plan: None,
         jobs: 1,
         total_memory: 0,
         threads: None,
@@ -235,6 +239,7 @@ fn a_root_that_cannot_be_written_starts_nothing() {
         program: Path::new("/bin/sh").into(),
         arguments: &["-c", "exit 1"],
         force: false,
+        plan: None,
         jobs: 1,
         total_memory: 0,
         threads: None,
@@ -242,4 +247,68 @@ fn a_root_that_cannot_be_written_starts_nothing() {
     };
     let (outcomes, recorded) = run(&batch, &[task("a", 1, 0, 0)], &());
     assert!(outcomes.is_empty() && recorded.is_err());
+}
+
+#[test]
+fn a_shard_writes_a_file_of_its_own_and_no_manifest() {
+    let root = tempfile::tempdir().unwrap();
+    let script = format!(r#"read job; echo "$job" > "$2/job"; {}"#, &BUILDS[10..]);
+    let arguments = ["-c", script.as_str()];
+    let batch = Batch {
+        output: root.path(),
+        program: "/bin/sh".into(),
+        arguments: &arguments,
+        force: true,
+        plan: None,
+        jobs: 1,
+        total_memory: 0,
+        threads: None,
+        voice: Voice::default(),
+    };
+    let shard = Shard {
+        number: 2,
+        count: 3,
+    };
+    let tasks = [task("a", 1, 0, 0)];
+    let (outcomes, recorded) = run_shard(&batch, "p7", shard, &tasks, &());
+    recorded.unwrap();
+    assert_eq!(outcomes[0].state, AssetState::Built);
+    let mut found = Vec::new();
+    let attempts = read(root.path(), "p7", |one| found.push(one.outcome.id)).unwrap();
+    assert_eq!((attempts.len(), attempts[0].shard), (1, shard));
+    assert!(attempts[0].complete);
+    assert_eq!(found, ["a"]);
+    assert!(!root.path().join("manifest.jsonl").exists());
+    // The worker notes for which plan it builds.
+    let job = fs::read_to_string(root.path().join("job")).unwrap();
+    assert!(job.contains(r#""plan":"p7""#), "{job}");
+}
+
+#[test]
+fn a_worker_that_an_engine_ends_with_the_run_is_cancelled_and_one_that_is_killed_failed() {
+    let root = tempfile::tempdir().unwrap();
+    let end = |signal: &str, stopping: bool| {
+        let script = format!("read job; kill -{signal} $$");
+        let start = Start {
+            program: Path::new("/bin/sh"),
+            arguments: &["-c", &script],
+            output: root.path(),
+            plan: None,
+            threads: 1,
+            voice: Voice::default(),
+        };
+        let (sender, receiver) = std::sync::mpsc::channel();
+        let mut process = Process::start(&start, 0, &task("a", 1, 0, 0), &sender).unwrap();
+        while !matches!(receiver.recv().unwrap(), Message::Closed(_)) || !process.closed() {}
+        let (outcome, in_order) = process.conclude(root.path(), &|| stopping);
+        assert!(!in_order);
+        outcome.state_name().to_owned()
+    };
+    for signal in ["TERM", "INT", "HUP"] {
+        assert_eq!(end(signal, true), "cancelled", "{signal}");
+        assert_eq!(end(signal, false), "failed", "{signal}");
+    }
+    for signal in ["KILL", "SEGV", "ABRT"] {
+        assert_eq!(end(signal, true), "failed", "{signal}");
+    }
 }

@@ -33,6 +33,8 @@ pub struct Job {
     pub threads: usize,
     /// Cap on memory, bytes; 0: none.
     pub memory: u64,
+    /// The plan that it is a part of, by its id.
+    pub plan: Option<String>,
     /// The process that wants it.
     pub parent: u32,
     /// How it speaks.
@@ -120,10 +122,12 @@ pub fn work(job: &Job, path: &Path, output: &Path) -> AssetOutcome {
     told.leave();
     outcome.look_for_older(output);
     outcome.peak_memory = limits::peak_memory();
+    outcome.host = limits::host();
     let after = read::fingerprint(path).ok();
     match (before, after) {
         (Some(before), Some(after)) if before == after => {
-            let stored = cache::store(output, &before.hash, config.flat(), &outcome);
+            let plan = job.plan.as_deref();
+            let stored = cache::store(output, &before.hash, config.flat(), plan, &outcome);
             if let Err(error) = stored {
                 tracing::warn!(asset = job.id, %error, "built, but the next run cannot know it and will build it again");
             }
@@ -218,6 +222,7 @@ mod tests {
             cone_lines: vec![3, 4],
             threads: 2,
             memory: 1 << 30,
+            plan: Some("00ff".into()),
             parent: 7,
             voice: Voice::default(),
         };

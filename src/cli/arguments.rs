@@ -1,5 +1,6 @@
 //! Arguments and their help texts.
 
+use affine_atlas::batch::shard::{self, Shard};
 use affine_atlas::fit::{DEFAULT_SPACING, LEAST_SPACING};
 use affine_atlas::job::texture::{DEFAULT_REPEAT, DEFAULT_SIZE, SIZE_RANGE};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -12,7 +13,7 @@ Exit codes:
     2  wrong arguments or configuration
     3  nothing to do
     4  an error of this program
-  130  stopped by Ctrl-C";
+  130  stopped by Ctrl-C or SIGTERM";
 
 /// Turns triangle meshes into affine atlases.
 ///
@@ -67,6 +68,15 @@ pub enum Command {
     /// Build an atlas of each mesh
     #[command(after_help = BUILD_EXAMPLES, after_long_help = BUILD_EXAMPLES)]
     Build(Build),
+    /// Write down what a build would do, for several machines
+    #[command(after_help = PLAN_EXAMPLES, after_long_help = PLAN_EXAMPLES)]
+    Plan(Plan),
+    /// Build one shard of a plan
+    #[command(after_help = RUN_EXAMPLES, after_long_help = RUN_EXAMPLES)]
+    Run(Run),
+    /// Put what all shards of a plan built together, as one build
+    #[command(after_help = MERGE_EXAMPLES, after_long_help = MERGE_EXAMPLES)]
+    Merge(Merge),
     /// Say what a build would do, and build nothing
     #[command(after_help = CHECK_EXAMPLES, after_long_help = CHECK_EXAMPLES)]
     Check(Check),
@@ -112,7 +122,8 @@ const SCHEMA_EXAMPLES: &str = "\
 Examples:
   affine-atlas schema config > config.schema.json     for editors that complete TOML
   affine-atlas schema atlas                           of atlas.json
-  affine-atlas schema manifest                        of each line of manifest.jsonl";
+  affine-atlas schema manifest                        of each line of manifest.jsonl
+  affine-atlas schema plan                            of each line of a plan";
 
 const BUILD_EXAMPLES: &str = "\
 Examples:
@@ -128,6 +139,36 @@ report.html. It appears when it is complete; an older good folder stays if the b
 mesh, settings and version are the same as last time and the folder is whole, nothing is built. OUT
 also gets manifest.jsonl and junit.xml (what became of each mesh), index.html (the same to look at)
 and logs/NAME.log.";
+
+const PLAN_EXAMPLES: &str = "\
+Examples:
+  affine-atlas plan my.toml --out atlases --plan night.jsonl --shards 16
+  affine-atlas run --plan night.jsonl --shard 1/16       to 16/16, on any machines, in any order
+  affine-atlas merge --plan night.jsonl
+
+Machines need a common file system with the meshes and OUT, and the same version of this program.
+Relative paths start at the folder in which the plan is made: start all three there. Shards are of
+about the same expected time; how many there are is chosen with `run`, and --shards only shows what
+it comes to. The plan holds all settings: no configuration is read again.";
+
+const RUN_EXAMPLES: &str = "\
+Examples:
+  affine-atlas run --plan night.jsonl --shard 3/16
+  affine-atlas run --plan night.jsonl --shard $SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT
+  affine-atlas run --plan night.jsonl                    all of it
+
+May be run again at any time, after a kill or by an engine that is not sure: what this plan has
+built is not built again, and reported as before. A request to stop (SIGTERM, Ctrl-C) ends it within
+seconds. Exit codes are those of a build of these meshes; a shard without meshes is good.";
+
+const MERGE_EXAMPLES: &str = "\
+Examples:
+  affine-atlas merge --plan night.jsonl
+  affine-atlas merge --plan night.jsonl --incomplete     also while some are not done
+
+Writes manifest.jsonl, junit.xml and index.html of OUT as one build of all meshes would have, and
+gives its exit code. Where a mesh is not done nothing is written, and the shards that it belongs to
+are named: exit code 1. With --incomplete it is recorded as cancelled: exit code 130.";
 
 const CHECK_EXAMPLES: &str = "\
 Examples:
@@ -233,6 +274,50 @@ pub struct Build {
     /// Meshes to build at the same time; 0 takes one for each core [default: run.jobs of the configuration]
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
     pub jobs: Option<u16>,
+}
+
+#[derive(Debug, Args)]
+pub struct Plan {
+    #[command(flatten)]
+    pub inputs: Inputs,
+    /// Folder for the atlases [default: output.folder of the configuration, or affine-atlas-out]
+    #[arg(short, long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Build also what is there, whole, and of the same mesh, settings and version
+    #[arg(short, long)]
+    pub force: bool,
+    /// Say how even so many shards would be
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(shard::MOST)))]
+    pub shards: Option<u32>,
+    /// File to write, replacing an older one
+    #[arg(short, long, value_name = "PLAN.jsonl")]
+    pub plan: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct Run {
+    /// File that `affine-atlas plan` wrote
+    #[arg(short, long, value_name = "PLAN.jsonl")]
+    pub plan: PathBuf,
+    /// Which part, from 1, and of how many
+    #[arg(short, long, value_name = "I/N", default_value_t = Shard::WHOLE)]
+    pub shard: Shard,
+    /// Meshes to build at the same time; 0 takes one for each core [default: run.jobs of the configuration]
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
+    pub jobs: Option<u16>,
+}
+
+#[derive(Debug, Args)]
+pub struct Merge {
+    /// File that `affine-atlas plan` wrote
+    #[arg(short, long, value_name = "PLAN.jsonl")]
+    pub plan: PathBuf,
+    /// Record meshes that are not done as cancelled instead of refusing
+    #[arg(long)]
+    pub incomplete: bool,
+    /// Write for Make and Ninja which files OUT/manifest.jsonl was made from
+    #[arg(long, value_name = "FILE")]
+    pub depfile: Option<PathBuf>,
 }
 
 /// What `build` tells a worker beside its job.
@@ -400,6 +485,8 @@ pub enum SchemaOf {
     Manifest,
     /// config.toml
     Config,
+    /// a line of a plan
+    Plan,
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! `affine-atlas check`.
 
 use super::arguments::{Check, Global, LogFormat};
-use super::plan::{plan, start_threads};
+use super::inputs::{select, start_threads};
 use super::problem::Problem;
 use super::work::Work;
 use super::{exit, panics, terminal};
@@ -12,10 +12,10 @@ use std::path::Path;
 
 /// Says for every asset what a build would do. Exit code 1 where one would be refused.
 pub fn run(check: &Check, global: &Global, work: &Work) -> Result<u8, Problem> {
-    let plan = plan(&check.inputs, None)?;
-    start_threads(global.threads, &plan.config)?;
+    let selected = select(&check.inputs, None)?;
+    start_threads(global.threads, &selected.config)?;
     let mut code = exit::GOOD;
-    for (asset, settings) in plan.items() {
+    for (asset, settings) in selected.items() {
         let inspected =
             panics::catch(|| (work.inspect)(asset, &settings.config)).unwrap_or_else(|panic| {
                 Err(Failure {
@@ -33,7 +33,7 @@ pub fn run(check: &Check, global: &Global, work: &Work) -> Result<u8, Problem> {
                     terminal::print(&format!("{heading}\n{}\n", inspection.text.trim_end()));
                 }
                 if let Some(path) = &check.region {
-                    let path = match plan.assets.len() {
+                    let path = match selected.assets.len() {
                         1 => path.clone(),
                         _ => path.with_file_name(one_of_many(path, &asset.id)),
                     };

@@ -1,8 +1,8 @@
 //! `affine-atlas cones`.
 
 use super::arguments::{Cones, Global, LogFormat};
-use super::build::exit_code;
-use super::plan::{Plan, plan, start_threads};
+use super::batch::exit_code;
+use super::inputs::{Selection, select, start_threads};
 use super::problem::Problem;
 use super::progress::Progress;
 use super::work::{SurveyRequest, Surveyed, Work};
@@ -16,19 +16,19 @@ use std::time::Instant;
 
 /// Surveys every asset, shows the tables, and gives the exit code.
 pub fn run(cones: &Cones, global: &Global, work: &Work) -> Result<u8, Problem> {
-    let plan = plan(&cones.inputs, cones.out.as_deref())?;
-    plan.keep_inputs(|asset| plan.output.join((work.survey_folder)(&asset.id)))?;
-    start_threads(global.threads, &plan.config)?;
+    let selected = select(&cones.inputs, cones.out.as_deref())?;
+    selected.keep_inputs(|asset| selected.output.join((work.survey_folder)(&asset.id)))?;
+    start_threads(global.threads, &selected.config)?;
     let counts: Option<Vec<usize>> =
         (cones.counts.as_ref()).map(|counts| counts.iter().map(|&count| count as usize).collect());
     let announce = !global.quiet && global.log_format == LogFormat::Text;
     interrupt::install(work.remove_staging, announce);
-    let progress = Progress::new(global, plan.assets.len()).calling_it("surveyed");
-    let mut surveyed = Vec::with_capacity(plan.assets.len());
-    for (index, (asset, settings)) in plan.items().enumerate() {
+    let progress = Progress::new(global, selected.assets.len()).calling_it("surveyed");
+    let mut surveyed = Vec::with_capacity(selected.assets.len());
+    for (index, (asset, settings)) in selected.items().enumerate() {
         let observer = progress.asset(&asset.id, index);
         let one = survey_one(
-            &plan,
+            &selected,
             asset,
             &settings.config,
             counts.as_deref(),
@@ -43,8 +43,8 @@ pub fn run(cones: &Cones, global: &Global, work: &Work) -> Result<u8, Problem> {
         let records: Vec<_> = surveyed.iter().filter_map(|s| s.json.clone()).collect();
         terminal::print(&format!("{:#}\n", serde_json::Value::Array(records)));
     } else if !global.quiet {
-        for (asset, one) in plan.assets.iter().zip(&surveyed) {
-            terminal::print(&show(&plan, asset, one, work));
+        for (asset, one) in selected.assets.iter().zip(&surveyed) {
+            terminal::print(&show(&selected, asset, one, work));
         }
     }
     let outcomes: Vec<AssetOutcome> = surveyed.into_iter().map(|s| s.outcome).collect();
@@ -59,7 +59,7 @@ pub fn run(cones: &Cones, global: &Global, work: &Work) -> Result<u8, Problem> {
 
 /// A panic while an asset is surveyed is that asset's failure; the others go on.
 fn survey_one(
-    plan: &Plan,
+    selected: &Selection,
     asset: &Asset,
     config: &Config,
     counts: Option<&[usize]>,
@@ -78,7 +78,7 @@ fn survey_one(
     }
     let request = SurveyRequest {
         asset,
-        output: &plan.output,
+        output: &selected.output,
         config,
         counts,
     };
@@ -94,13 +94,13 @@ fn survey_one(
 }
 
 /// The table of an asset and what to do with it; empty where there is none.
-fn show(plan: &Plan, asset: &Asset, one: &Surveyed, work: &Work) -> String {
+fn show(selected: &Selection, asset: &Asset, one: &Surveyed, work: &Work) -> String {
     if one.text.is_empty() {
         return String::new();
     }
     let heading = style(format!("{} ({})", asset.id, asset.path.display())).bold();
     let mut text = format!("{heading}\n{}\n", one.text.trim_end());
-    let folder = plan.output.join((work.survey_folder)(&asset.id));
+    let folder = selected.output.join((work.survey_folder)(&asset.id));
     if !one.outcome.files.is_empty() {
         text.push_str(&format!(
             "wrote {} ({} files)\n",

@@ -2,7 +2,7 @@
 
 use super::arguments::{Explain, Global};
 use super::check::{one_of_many, show_failure, write_whole};
-use super::plan::{plan, start_threads};
+use super::inputs::{select, start_threads};
 use super::problem::Problem;
 use super::work::{ExplainRequest, Work};
 use super::{exit, panics, terminal};
@@ -88,9 +88,9 @@ fn requests(explain: &Explain, global: &Global) -> Result<Vec<ExplainRequest>, P
             config: Config::default(),
         }]);
     }
-    let plan = plan(&explain.inputs, None)?;
-    start_threads(global.threads, &plan.config)?;
-    let requests = plan.assets.iter().zip(&plan.settings);
+    let selected = select(&explain.inputs, None)?;
+    start_threads(global.threads, &selected.config)?;
+    let requests = selected.assets.iter().zip(&selected.settings);
     Ok(requests
         .map(|(asset, settings)| ExplainRequest {
             asset: asset.path.clone(),

@@ -2,7 +2,7 @@
 
 use super::arguments::{Fit, Global, LogFormat};
 use super::check::show_failure;
-use super::plan::start_threads;
+use super::inputs::start_threads;
 use super::problem::Problem;
 use super::work::{FitRequest, Work};
 use super::{exit, interrupt, panics, terminal};

@@ -1,19 +1,24 @@
 //! The command line: reads arguments, shows progress, words results. Computes nothing.
 
 mod arguments;
+mod batch;
 mod build;
 mod check;
 mod cones;
 mod explain;
 mod fit;
 mod init;
+mod inputs;
 mod interrupt;
 mod log;
+mod merge;
 mod panics;
 mod plan;
+
 mod problem;
 mod progress;
 mod rebuild;
+mod run;
 mod schema;
 mod summary;
 mod terminal;
@@ -40,7 +45,7 @@ mod exit {
     pub const NOTHING_TO_DO: u8 = 3;
     /// An error of this program.
     pub const INTERNAL: u8 = 4;
-    /// Stopped by Ctrl-C, as shells number it: 128 + SIGINT.
+    /// Stopped by Ctrl-C or another request, as shells number it: 128 + SIGINT.
     pub const INTERRUPTED: u8 = 130;
 }
 
@@ -73,6 +78,9 @@ fn run(arguments: &Arguments, work: &Work) -> Result<u8, Problem> {
     let global = &arguments.global;
     match &arguments.command {
         Command::Build(build) => build::run(build, global, work),
+        Command::Plan(asked) => plan::run(asked, global, work),
+        Command::Run(shard) => run::run(shard, global, work),
+        Command::Merge(asked) => merge::run(asked, global, work),
         Command::Check(check) => check::run(check, global, work),
         Command::Cones(cones) => cones::run(cones, global, work),
         Command::Verify(verify) => verify::run(verify, global, work),

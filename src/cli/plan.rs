@@ -1,243 +1,89 @@
-//! From arguments to what is to be done: the configuration and the named assets.
+//! `affine-atlas plan`.
 
-use super::arguments::Inputs;
+use super::arguments::{Global, Plan as Arguments};
+use super::batch::batch;
+use super::check::write_whole;
+use super::inputs::select;
 use super::problem::Problem;
-use affine_atlas::batch::{Settings, Task, inputs};
-use affine_atlas::config::assets::{Asset, name_assets};
-use affine_atlas::config::{self, Config, Loaded};
-use rayon::prelude::*;
-use std::collections::HashMap;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use super::progress::in_words;
+use super::work::Work;
+use super::{exit, terminal};
+use affine_atlas::batch::plan::{Decision, Plan, Purpose};
+use affine_atlas::batch::shard;
 
-/// What is to be done.
-#[derive(Debug)]
-pub struct Plan {
-    /// The effective configuration.
-    pub config: Config,
-    /// The output folder, relative to the current folder or absolute.
-    pub output: PathBuf,
-    /// At least one.
-    pub assets: Vec<Asset>,
-    /// The settings of each asset.
-    pub settings: Vec<Arc<Settings>>,
-    /// Files that were read to make the plan.
-    pub files: Vec<PathBuf>,
-}
-
-/// Reads the configuration and names the assets.
-///
-/// Positional arguments that end in `.toml` are a configuration, all others name meshes and take
-/// the place of `input.paths`. Meshes without a configuration use the defaults; `config.toml` is
-/// read only where nothing is named at all.
-pub fn plan(inputs: &Inputs, out: Option<&Path>) -> Result<Plan, Problem> {
-    let (configs, meshes): (Vec<&PathBuf>, Vec<&PathBuf>) =
-        inputs.inputs.iter().partition(|path| is_config(path));
-    let default = PathBuf::from("config.toml");
-    let file = match configs[..] {
-        [] if meshes.is_empty() => Some(&default),
-        [] => None,
-        [only] => Some(only),
-        [first, second, ..] => {
-            return Err(Problem::TwoConfigs {
-                first: first.clone(),
-                second: second.clone(),
-            });
-        }
+/// Writes down what a build would do, and says how much that is.
+pub fn run(arguments: &Arguments, global: &Global, work: &Work) -> Result<u8, Problem> {
+    let selected = select(&arguments.inputs, arguments.out.as_deref())?;
+    selected.keep_inputs(|asset| selected.folder(asset))?;
+    let folder = std::env::current_dir().map_err(|error| Problem::NoPlace {
+        reason: error.to_string(),
+    })?;
+    let tasks = selected.tasks();
+    let run = &selected.config.run;
+    let batch = batch(
+        &selected.output,
+        arguments.force,
+        run.jobs,
+        run.total_memory,
+        global,
+    )?;
+    let verdicts = (work.decide)(&batch, &tasks);
+    let purpose = Purpose {
+        folder,
+        output: selected.output.clone(),
+        force: arguments.force,
+        files: selected.files.clone(),
+        run: run.clone(),
     };
-    let mut loaded = match file {
-        Some(file) => config::load(file, &inputs.set)?,
-        None => config::defaults(&inputs.set)?,
+    let plan = Plan::new(purpose, tasks, &verdicts)?;
+    // First: a plan whose output root cannot be written is of no use to anybody.
+    plan.mark_place().map_err(|error| Problem::NotRecorded {
+        path: selected.output.clone(),
+        reason: error.to_string(),
+    })?;
+    write_whole(&arguments.plan, plan.to_text().as_bytes())?;
+    if !global.quiet {
+        terminal::print(&said(&plan, arguments));
+    }
+    Ok(exit::GOOD)
+}
+
+fn said(plan: &Plan, arguments: &Arguments) -> String {
+    let all = plan.assets.len();
+    let of = |decision| plan.assets.iter().filter(move |a| a.decision == decision);
+    let builds = of(Decision::Build).count();
+    let total = plan
+        .assets
+        .iter()
+        .fold(0, |sum: u64, asset| sum.saturating_add(asset.estimate));
+    let seconds = |milliseconds: u64| match milliseconds {
+        0..1000 => "less than 1 s".to_owned(),
+        _ => format!("about {}", in_words(milliseconds as f64 / 1e3)),
     };
-    if !meshes.is_empty() {
-        loaded.config.input.paths = meshes.into_iter().cloned().collect();
-        loaded.input_base = PathBuf::new();
-    }
-    if let Some(out) = out {
-        loaded.config.output.folder = out.to_owned();
-        loaded.output_base = PathBuf::new();
-    }
-    if loaded.config.input.paths.is_empty() {
-        return Err(Problem::NoInputs);
-    }
-    let output = loaded.output_folder();
-    let inputs = inputs::expand(&loaded.config.input.paths, &loaded.input_base, &output)?;
-    if inputs.files.is_empty() {
-        return Err(Problem::NothingFound {
-            notes: inputs.notes,
-        });
-    }
-    for note in &inputs.notes {
-        tracing::warn!("{note}");
-    }
-    let assets = name_assets(inputs.files);
-    let settings = settings(&mut loaded, &assets)?;
-    let mut files = loaded.files;
-    files.extend(inputs.lists);
-    Ok(Plan {
-        settings,
-        config: loaded.config,
-        output,
-        assets,
-        files,
-    })
-}
-
-/// The settings of each asset; those for which the same tables are share theirs.
-fn settings(loaded: &mut Loaded, assets: &[Asset]) -> Result<Vec<Arc<Settings>>, Problem> {
-    let mut known: HashMap<Vec<usize>, Arc<Settings>> = HashMap::new();
-    let mut of_assets = Vec::with_capacity(assets.len());
-    for asset in assets {
-        let tables = loaded.overrides_for(&asset.given);
-        let settings = match known.get(&tables) {
-            Some(settings) => Arc::clone(settings),
-            None => {
-                let settings = Arc::new(Settings::new(loaded.config_with(&tables)?));
-                known.insert(tables, Arc::clone(&settings));
-                settings
-            }
-        };
-        of_assets.push(settings);
-    }
-    for (i, table) in loaded.overrides().iter().enumerate() {
-        if !known.keys().any(|tables| tables.contains(&i)) {
-            let pattern = &table.pattern;
-            tracing::warn!(
-                "{}: no mesh of this run matches `{pattern}`: this [[asset]] table has no effect",
-                table.at
-            );
-        }
-    }
-    Ok(of_assets)
-}
-
-fn is_config(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
-}
-
-impl Plan {
-    /// The folder that is written for an asset.
-    pub fn folder(&self, asset: &Asset) -> PathBuf {
-        self.output.join(&asset.id)
-    }
-
-    /// Every asset with its settings.
-    pub fn items(&self) -> impl Iterator<Item = (&Asset, &Arc<Settings>)> {
-        self.assets.iter().zip(&self.settings)
-    }
-
-    /// What is to be done, once all input files have been hashed.
-    pub fn tasks(&self) -> Vec<Task> {
-        let items: Vec<_> = self.items().collect();
-        let look = |&(asset, settings): &(&Asset, &Arc<Settings>)| Task::new(asset, settings);
-        items.par_iter().map(look).collect()
-    }
-
-    /// Refuses a plan in which an asset's folder, which is replaced as a whole, holds an input:
-    /// `build spot/spot.obj --out .` must not delete `spot/spot.obj`.
-    /// `folder` is that of an asset.
-    pub fn keep_inputs(&self, folder: impl Fn(&Asset) -> PathBuf) -> Result<(), Problem> {
-        let folders = self.assets.iter().map(folder);
-        // A folder that does not exist holds nothing.
-        let real = folders.filter_map(|folder| Some((folder.canonicalize().ok()?, folder)));
-        let real: HashMap<PathBuf, PathBuf> = real.collect();
-        if real.is_empty() {
-            return Ok(());
-        }
-        for input in self.assets.iter().map(|asset| &asset.path) {
-            let Ok(resolved) = input.canonicalize() else {
-                continue;
-            };
-            if let Some(folder) = resolved.ancestors().find_map(|above| real.get(above)) {
-                return Err(Problem::OverwritesInput {
-                    folder: folder.clone(),
-                    input: input.clone(),
-                });
-            }
-        }
-        Ok(())
-    }
-}
-
-/// Sets up the threads of this run: the option, else the configuration, else one for each core.
-pub fn start_threads(option: Option<u16>, config: &Config) -> Result<(), Problem> {
-    let given = option.map_or(config.run.threads, usize::from);
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(given)
-        .build_global()
-        .map_err(|error| Problem::Threads {
-            given,
-            reason: error.to_string(),
-        })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn inputs(names: &[&Path], set: &[&str]) -> Inputs {
-        Inputs {
-            inputs: names.iter().map(|name| name.to_path_buf()).collect(),
-            set: set.iter().map(|&text| text.to_owned()).collect(),
-        }
-    }
-
-    #[test]
-    fn meshes_use_the_defaults_and_start_at_the_current_folder() {
-        let plan = plan(&inputs(&[Path::new("m/a.obj")], &[]), None).expect("planned");
-        assert_eq!(plan.assets[0].path, Path::new("m/a.obj"));
-        assert_eq!(plan.output, Path::new("affine-atlas-out"));
-        assert_eq!(
-            plan.folder(&plan.assets[0]),
-            Path::new("affine-atlas-out/a")
-        );
-    }
-
-    #[test]
-    fn meshes_beside_a_configuration_replace_its_paths() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let file = folder.path().join("my.TOML");
-        std::fs::write(
-            &file,
-            "[input]\npaths = [\"x.obj\"]\n[patches]\npadding = 7",
-        )
-        .expect("written");
-        let own = plan(&inputs(&[&file], &[]), Some(Path::new("out"))).expect("planned");
-        assert_eq!(own.assets[0].path, folder.path().join("x.obj"));
-        assert_eq!(own.output, Path::new("out"));
-        let other = plan(&inputs(&[Path::new("y.obj"), &file], &[]), None).expect("planned");
-        assert_eq!(other.assets[0].path, Path::new("y.obj"));
-        assert_eq!(other.output, folder.path().join("affine-atlas-out"));
-        assert_eq!(other.config.patches.padding, 7);
-    }
-
-    #[test]
-    fn two_configurations_and_no_mesh_are_refused() {
-        let two = plan(
-            &inputs(&[Path::new("a.toml"), Path::new("b.toml")], &[]),
-            None,
-        );
-        assert!(matches!(two, Err(Problem::TwoConfigs { .. })));
-        let none = plan(&inputs(&[Path::new("a.obj")], &["flow.scheme"]), None);
-        assert!(matches!(none, Err(Problem::Config(_))));
-    }
-
-    #[test]
-    fn an_input_inside_its_own_output_is_refused() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let inner = folder.path().join("spot");
-        std::fs::create_dir(&inner).expect("created");
-        let mesh = inner.join("spot.obj");
-        std::fs::write(&mesh, "").expect("written");
-        let inside = plan(&inputs(&[&mesh], &[]), Some(folder.path())).expect("planned");
-        assert!(matches!(
-            inside.keep_inputs(|asset| inside.folder(asset)),
-            Err(Problem::OverwritesInput { .. })
+    let mut text = format!(
+        "{builds} of {all} to build, {} of work one after the other\n",
+        seconds(total)
+    );
+    if let Some(count) = arguments.shards {
+        let loads = shard::loads(plan, count);
+        let most = loads.iter().copied().max().unwrap_or(0);
+        let busy: Vec<u64> = loads.into_iter().filter(|&load| load > 0).collect();
+        let least = busy.iter().copied().min().unwrap_or(0);
+        let empty = count as usize - busy.len();
+        let even = total as f64 / f64::from(count);
+        text.push_str(&format!(
+            "{count} shards of {} to {}, the largest {:.2} times an equal part",
+            seconds(least),
+            seconds(most),
+            most as f64 / even.max(1.0)
         ));
-        let beside = plan(&inputs(&[&mesh], &[]), Some(&inner)).expect("planned");
-        beside
-            .keep_inputs(|asset| beside.folder(asset))
-            .expect("spot/spot does not exist");
+        match empty {
+            0 => {}
+            1 => text.push_str("; 1 has nothing to do"),
+            _ => text.push_str(&format!("; {empty} have nothing to do")),
+        }
+        text.push('\n');
     }
+    text.push_str(&format!("wrote {}\n", arguments.plan.display()));
+    text
 }

@@ -3,6 +3,7 @@
 use super::arguments::LogFormat;
 use super::{exit, terminal};
 use affine_atlas::batch::inputs::InputError;
+use affine_atlas::batch::plan::PlanError;
 use affine_atlas::config::ConfigError;
 use miette::{
     Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource, SourceCode,
@@ -20,6 +21,18 @@ pub enum Problem {
     TwoConfigs { first: PathBuf, second: PathBuf },
     #[error(transparent)]
     Input(#[from] InputError),
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    #[error("the current folder cannot be found: {reason}")]
+    NoPlace { reason: String },
+    #[error("{missing} of {all} meshes {} not done ({first}): {shards}", if *missing == 1 { "is" } else { "are" })]
+    NotDone {
+        missing: usize,
+        all: usize,
+        first: String,
+        shards: String,
+        again: String,
+    },
     #[error("no mesh is named: `input.paths` is empty")]
     NoInputs,
     #[error("no mesh was found: {}", notes.join("; "))]
@@ -52,7 +65,7 @@ impl Problem {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::NoInputs | Self::NothingFound { .. } => exit::NOTHING_TO_DO,
-            Self::NotRecorded { .. } => exit::SOME_FAILED,
+            Self::NotRecorded { .. } | Self::NotDone { .. } => exit::SOME_FAILED,
             Self::Internal(_) => exit::INTERNAL,
             _ => exit::USAGE,
         }
@@ -68,6 +81,13 @@ impl Problem {
                 "name a mesh: `affine-atlas build MESH`, or list meshes in `input.paths`"
             }
             Self::Input(error) => error.remedy(),
+            Self::Plan(error) => error.remedy(),
+            Self::NoPlace { .. } => "start the command in a folder that exists",
+            Self::NotDone { again, .. } => {
+                return Some(format!(
+                    "wait, or run what is missing: `{again}`; or merge what is there with `--incomplete`"
+                ));
+            }
             Self::NothingFound { .. } => {
                 "check names and folders; quotes keep the shell from replacing `*` by itself"
             }

@@ -69,7 +69,7 @@ impl Running {
 const LEAST_COST: u64 = 20_000;
 
 /// So many seconds in words: "40 s", "3 min", "2 h 5 min".
-fn in_words(seconds: f64) -> String {
+pub fn in_words(seconds: f64) -> String {
     let minutes = (seconds / 60.0).round() as u64;
     match minutes {
         0 | 1 if seconds < 90.0 => format!("{seconds:.0} s"),

@@ -2,7 +2,7 @@
 
 use super::arguments::{Global, Rebuild};
 use super::check::{show_failure, write_whole};
-use super::plan::start_threads;
+use super::inputs::start_threads;
 use super::problem::Problem;
 use super::work::{RebuildRequest, Work};
 use super::{exit, panics, terminal};

@@ -11,6 +11,7 @@ pub fn run(asked: &Schema) -> Result<u8, Problem> {
         SchemaOf::Atlas => schema::atlas(),
         SchemaOf::Manifest => schema::manifest(),
         SchemaOf::Config => schema::config(),
+        SchemaOf::Plan => schema::plan(),
     };
     terminal::print(&format!("{schema:#}\n"));
     Ok(exit::GOOD)

@@ -3,7 +3,7 @@
 use super::arguments::{Global, LogFormat, Texture};
 use super::check::show_failure;
 use super::fit::beside;
-use super::plan::start_threads;
+use super::inputs::start_threads;
 use super::problem::Problem;
 use super::work::{TextureRequest, Work};
 use super::{exit, interrupt, panics, terminal};

@@ -2,7 +2,7 @@
 
 use super::arguments::{Global, Verify};
 use super::check::show_failure;
-use super::plan::start_threads;
+use super::inputs::start_threads;
 use super::problem::Problem;
 use super::work::{VerifyRequest, Work};
 use super::{exit, panics, terminal};

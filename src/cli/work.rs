@@ -1,6 +1,9 @@
 //! What the command line asks of the library.
 
 use affine_atlas::batch::cache::Verdict;
+use affine_atlas::batch::merge::Merged;
+use affine_atlas::batch::plan::Plan;
+use affine_atlas::batch::shard::Shard;
 use affine_atlas::batch::worker::Job;
 use affine_atlas::batch::{Batch, Task, Watcher};
 use affine_atlas::config::Config;
@@ -14,6 +17,12 @@ use std::path::{Path, PathBuf};
 pub struct Work {
     /// Builds what is not whole, each asset in a process of its own, and writes down what became of it.
     pub batch: fn(&Batch<'_>, &[Task], &dyn Watcher) -> Recorded,
+    /// The same for a shard of the plan of this id, in a file of its own.
+    pub shard: fn(&Batch<'_>, &str, Shard, &[Task], &dyn Watcher) -> Recorded,
+    /// Reads what all shards of a plan wrote down.
+    pub collect: fn(&Plan) -> Result<Merged, Failure>,
+    /// Writes it down as one batch.
+    pub merge: fn(&Plan, &Merged) -> Result<(), Failure>,
     /// Says what a batch would build.
     pub decide: fn(&Batch<'_>, &[Task]) -> Vec<Verdict>,
     /// Does a worker's job: input, output root.

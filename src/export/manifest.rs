@@ -99,7 +99,7 @@ impl Record {
             error: failure.map(|f| f.message.clone()),
             seconds: outcome.seconds,
             peak_memory: outcome.peak_memory,
-            host: None,
+            host: outcome.host.clone(),
             files: outcome
                 .files
                 .iter()

@@ -4,7 +4,8 @@
 //! something goes wrong in the middle; a rerun must complete and give the same bytes as an undisturbed run. While an act runs, a watcher looks
 //! all the time whether any visible folder is half written.
 //!
-//! `cargo test --release --test drill` runs the acts, and a night of 100 assets, of which 5 are broken.
+//! `cargo test --release --test drill` runs the acts, a plan of 60 assets on what could be several machines, and a night of
+//! 100 assets, of which 5 are broken.
 //! `cargo test --release --test drill -- --ignored --nocapture` runs a night of 2,000 with measurements.
 
 // The fixtures themselves are not needed here.
@@ -16,6 +17,7 @@ mod acts;
 mod depfiles;
 mod disks;
 mod folders;
+mod machines;
 mod night;
 mod stage;
 
@@ -29,7 +31,7 @@ fn main() -> ExitCode {
     let mut arguments = Arguments::from_args();
     // Each act keeps all cores busy by itself.
     arguments.test_threads = Some(1);
-    let acts: [(&str, Act); 14] = [
+    let acts: [(&str, Act); 18] = [
         ("a_worker_is_killed", acts::a_worker_is_killed),
         ("the_batch_is_killed", acts::the_batch_is_killed),
         ("ctrl_c", acts::ctrl_c),
@@ -40,6 +42,16 @@ fn main() -> ExitCode {
         ("an_asset_runs_out_of_time", acts::an_asset_runs_out_of_time),
         ("the_cache_is_corrupted", acts::the_cache_is_corrupted),
         ("two_batches_share_a_root", acts::two_batches_share_a_root),
+        ("a_plan_is_carried_out", machines::a_plan_is_carried_out),
+        ("forced_plans_go_on", machines::forced_plans_go_on),
+        (
+            "inputs_change_after_the_plan",
+            machines::inputs_change_after_the_plan,
+        ),
+        (
+            "a_plan_moves_with_its_folder",
+            machines::a_plan_moves_with_its_folder,
+        ),
         ("the_disk_is_full", disks::the_disk_is_full),
         ("files_may_not_grow", disks::files_may_not_grow),
         (

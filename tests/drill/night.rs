@@ -13,9 +13,10 @@ use std::time::{Duration, Instant};
 type Found = Result<Option<String>, Failed>;
 
 /// A folder with a corpus and its configuration.
-struct Night {
+pub struct Night {
     folder: tempfile::TempDir,
-    assets: Vec<Asset>,
+    /// The corpus.
+    pub assets: Vec<Asset>,
 }
 
 /// What a run was like.
@@ -28,7 +29,8 @@ struct Ran {
 }
 
 impl Night {
-    fn new(assets: Vec<Asset>) -> Self {
+    /// Writes `meshes` and `config.toml`.
+    pub fn new(assets: Vec<Asset>) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let meshes = folder.path().join("meshes");
         let mut config = format!("{CONFIG}[input]\npaths = [\"meshes\"]\n");
@@ -47,18 +49,33 @@ impl Night {
         Self { folder, assets }
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    /// The folder itself.
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// A file of the folder.
+    pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
+    }
+
+    /// The program in this folder.
+    pub fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_affine-atlas"));
+        command
+            .args(arguments)
+            .current_dir(self.folder.path())
+            .env("NO_COLOR", "1")
+            .env_remove("RUST_BACKTRACE");
+        command
     }
 
     fn run(&self, out: &str, arguments: &[&str]) -> Ran {
         let start = Instant::now();
         let errors = self.path("errors.txt");
-        let mut child = Command::new(env!("CARGO_BIN_EXE_affine-atlas"))
-            .args(["build", "config.toml", "--quiet", "--out", out])
+        let mut child = self
+            .command(&["build", "config.toml", "--quiet", "--out", out])
             .args(arguments)
-            .current_dir(self.folder.path())
-            .env("NO_COLOR", "1")
             .stdout(Stdio::null())
             .stderr(fs::File::create(&errors).expect("made"))
             .spawn()
@@ -79,7 +96,8 @@ impl Night {
         }
     }
 
-    fn manifest(&self, out: &str) -> BTreeMap<String, Value> {
+    /// The records of a manifest by id.
+    pub fn manifest(&self, out: &str) -> BTreeMap<String, Value> {
         let text = fs::read_to_string(self.path(out).join("manifest.jsonl")).expect("a manifest");
         let records = text
             .lines()
@@ -89,7 +107,8 @@ impl Night {
             .collect()
     }
 
-    fn in_state(&self, out: &str, state: &str) -> BTreeSet<String> {
+    /// Ids whose record has this state.
+    pub fn in_state(&self, out: &str, state: &str) -> BTreeSet<String> {
         let manifest = self.manifest(out).into_iter();
         manifest
             .filter(|(_, record)| record["state"] == state)

@@ -3,17 +3,21 @@
 //! *Enters:* an outcome at a time. *Leaves:* `manifest.jsonl`, whole at every moment. Each outcome is appended to a journal at once, and
 //! the manifest is rewritten from time to time and at the end: rewriting it for each of thousands of assets would cost more than
 //! they do. A journal belongs to the process that holds a lock on it; one that nobody holds is what a killed run left, and is put
-//! into the manifest by the next run. Several runs in one output root take turns at the manifest, under a lock.
+//! into the manifest by the next run. Several runs in one output root take turns at the manifest, under a lock. Shards of a plan, which
+//! may run on other machines, where locks are not to be relied on, have files of their own ([`shard`]).
 
 mod depfile;
 mod junit;
+pub mod shard;
 
 pub use depfile::depfile;
 pub use junit::junit;
+pub use shard::ShardRecorder;
 
-use super::{limits, private_folder};
+use super::{Task, limits, private_folder};
 use crate::export::manifest::{Manifest, Record};
 use crate::export::{Action, ExportError, folder};
+use crate::outcome::AssetOutcome;
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
@@ -25,7 +29,13 @@ const INTERVAL: Duration = Duration::from_secs(2);
 /// Rewriting may take this part of the run's time at most.
 const SHARE: u32 = 50;
 
-/// Writes outcomes down as they come.
+/// Where outcomes are written down as they come.
+pub trait Recording {
+    /// Writes down one outcome.
+    fn record(&mut self, task: &Task, outcome: &AssetOutcome);
+}
+
+/// Writes outcomes into the manifest.
 pub struct Recorder {
     output: PathBuf,
     host: Option<String>,
@@ -93,9 +103,9 @@ impl Recorder {
         Ok(())
     }
 
-    /// Writes down one outcome.
-    pub fn record(&mut self, mut record: Record) {
-        record.host.clone_from(&self.host);
+    /// Writes down one record.
+    fn put(&mut self, mut record: Record) {
+        record.host = record.host.or_else(|| self.host.clone());
         if let Some((file, path)) = &mut self.journal
             && let Ok(mut line) = serde_json::to_vec(&record)
         {
@@ -112,6 +122,13 @@ impl Recorder {
             tracing::warn!(%error, "the manifest will be written at the end");
             self.saved = Instant::now();
         }
+    }
+
+    /// Takes records of other machines for [`Recorder::finish`] to write, as they are.
+    pub fn adopt(&mut self, records: impl IntoIterator<Item = Record>) {
+        let records = records.into_iter();
+        self.unsaved
+            .extend(records.map(|record| (record.id.clone(), record)));
     }
 
     /// Puts what is unsaved into the manifest.
@@ -147,6 +164,12 @@ impl Recorder {
             let _ = fs::remove_file(path);
         }
         Ok(())
+    }
+}
+
+impl Recording for Recorder {
+    fn record(&mut self, task: &Task, outcome: &AssetOutcome) {
+        self.put(Record::of(outcome, &task.config_hash));
     }
 }
 
@@ -203,7 +226,7 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let mut killed = Recorder::begin(root.path()).unwrap();
         for id in ["a", "b", "c"] {
-            killed.record(record(id));
+            killed.put(record(id));
         }
         let (_, path) = killed.journal.as_ref().unwrap();
         // What a kill in the middle of a line leaves.
@@ -222,11 +245,11 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let mut one = Recorder::begin(root.path()).unwrap();
         let mut other = Recorder::begin(root.path()).unwrap();
-        one.record(record("a"));
-        other.record(record("b"));
+        one.put(record("a"));
+        other.put(record("b"));
         assert_eq!(journals(root.path()), 2, "a journal that is held was taken");
         one.finish().unwrap();
-        other.record(record("c"));
+        other.put(record("c"));
         other.finish().unwrap();
         assert_eq!(ids(root.path()), ["a", "b", "c"]);
         assert!(
@@ -246,11 +269,11 @@ mod tests {
         let mut recorder = Recorder::begin(root.path()).unwrap();
         recorder.pause = Duration::from_secs(3600);
         for i in 0..100 {
-            recorder.record(record(&format!("a{i}")));
+            recorder.put(record(&format!("a{i}")));
         }
         assert!(!root.path().join("manifest.jsonl").exists());
         recorder.pause = Duration::ZERO;
-        recorder.record(record("b"));
+        recorder.put(record("b"));
         assert_eq!(ids(root.path()).len(), 101);
     }
 }

@@ -377,6 +377,11 @@ pub(crate) const RESERVED: [&str; 5] = [
     "manifest.jsonl",
 ];
 
+/// Whether a folder can have this name without meeting our own names.
+pub(crate) fn is_asset_name(name: &str) -> bool {
+    asset_name(name).is_ok()
+}
+
 /// The name, where it is one that a folder can have without meeting our own names.
 fn asset_name(name: &str) -> Result<&str, ExportError> {
     let bad = name.is_empty()

@@ -1,6 +1,5 @@
 //! What a run leaves for the next one to compare with: one line of JSON an asset.
 
-use super::HISTORY_NAME;
 use super::figures::{Asset, Figures};
 use crate::export::manifest::State;
 use crate::export::{Action, ExportError};
@@ -25,12 +24,11 @@ pub(super) struct Past {
 }
 
 /// The run before; nothing where there was none. Lines that are no records, such as those of another version, count as not there.
-pub(super) fn load(output_root: &Path) -> Result<BTreeMap<String, Past>, ExportError> {
-    let path = output_root.join(HISTORY_NAME);
-    let bytes = match fs::read(&path) {
+pub(super) fn load(path: &Path) -> Result<BTreeMap<String, Past>, ExportError> {
+    let bytes = match fs::read(path) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
-        Err(error) => return Err(ExportError::io(Action::Read, &path)(error)),
+        Err(error) => return Err(ExportError::io(Action::Read, path)(error)),
     };
     let lines = bytes.split(|&b| b == b'\n');
     let known = lines.filter_map(|line| serde_json::from_slice::<Past>(line).ok());

@@ -26,7 +26,16 @@ pub const HISTORY_NAME: &str = "history.jsonl";
 ///
 /// It compares with the run before by `history.jsonl`, which this replaces: call it once at the end of a run.
 pub fn write(output_root: &Path, current: &Manifest) -> Result<(), ExportError> {
-    let before = history::load(output_root)?;
+    write_against(output_root, current, &output_root.join(HISTORY_NAME))
+}
+
+/// The same against another history than that of the latest run.
+pub fn write_against(
+    output_root: &Path,
+    current: &Manifest,
+    history: &Path,
+) -> Result<(), ExportError> {
+    let before = history::load(history)?;
     let assets = figures::collect(output_root, current, &before);
     let changes = changes::compare(&before, &assets);
     let text = page::page(&assets, &changes);
