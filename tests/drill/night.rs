@@ -1,7 +1,7 @@
 //! A whole night: many assets, one of twenty broken, in one command; then a second night, and a third with three changes.
 
 use crate::folders::{atlases, unfinished};
-use crate::generate::batch::{Asset, CONFIG, corpus};
+use crate::generate::batch::{Asset, corpus, write};
 use libtest_mimic::Failed;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -32,20 +32,7 @@ impl Night {
     /// Writes `meshes` and `config.toml`.
     pub fn new(assets: Vec<Asset>) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let meshes = folder.path().join("meshes");
-        let mut config = format!("{CONFIG}[input]\npaths = [\"meshes\"]\n");
-        for asset in &assets {
-            for (name, bytes) in &asset.files {
-                let path = meshes.join(name);
-                fs::create_dir_all(path.parent().expect("a folder")).expect("made");
-                fs::write(path, bytes).expect("written");
-            }
-            if let Some(settings) = asset.settings {
-                let path = &asset.files[0].0;
-                config.push_str(&format!("[[asset]]\npath = \"meshes/{path}\"\n{settings}"));
-            }
-        }
-        fs::write(folder.path().join("config.toml"), config).expect("written");
+        write(&assets, folder.path()).expect("written");
         Self { folder, assets }
     }
 
