@@ -270,8 +270,9 @@ impl Process {
                 0 => no_memory(format!(
                     "found no memory for {asked} bytes more {during}: let fewer run at a time (run.jobs, run.total_memory), or decimate the mesh"
                 )),
+                // How many bytes more it asked for depends on threads and on what else the heap holds: records are to be the same on every machine.
                 cap => no_memory(format!(
-                    "needed more than the {cap} bytes of run.memory (for {asked} more, {during}): raise run.memory, lower patches.texel_budget, or decimate the mesh"
+                    "needed more than the {cap} bytes of run.memory ({during}): raise run.memory, lower patches.texel_budget, or decimate the mesh"
                 )),
             };
         }

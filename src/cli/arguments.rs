@@ -154,7 +154,7 @@ it comes to. The plan holds all settings: no configuration is read again.";
 const RUN_EXAMPLES: &str = "\
 Examples:
   affine-atlas run --plan night.jsonl --shard 3/16
-  affine-atlas run --plan night.jsonl --shard $SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT
+  affine-atlas run --plan night.jsonl --shard $SLURM_ARRAY_TASK_ID/20
   affine-atlas run --plan night.jsonl                    all of it
 
 May be run again at any time, after a kill or by an engine that is not sure: what this plan has
