@@ -24,9 +24,10 @@ pub(super) struct Faces<'a> {
 }
 
 impl Faces<'_> {
-    /// Exchanges diagonals; see the module docs. Each face at most once.
+    /// Exchanges diagonals; see the module docs. Where flat faces lie side by side, one after another gets area from the end where one has it: rounds go on
+    /// while they help, and each exchange leaves fewer of them.
     pub fn give_area(&mut self) {
-        let flat: Vec<usize> = (0..self.faces.len())
+        let mut flat: Vec<usize> = (0..self.faces.len())
             .filter(|&f| self.is_collinear(self.faces[f]))
             .collect();
         if flat.is_empty() {
@@ -41,33 +42,54 @@ impl Faces<'_> {
                 edges.insert(self.edge(a, b));
             }
         }
-        let mut changed: FxHashSet<usize> = FxHashSet::default();
-        for f in flat {
-            let corners = self.faces[f];
-            let length =
-                |k: usize| distance(self.place(corners[k]), self.place(corners[(k + 1) % 3]));
-            let longest = (0..3).fold(0, |best, k| if length(k) > length(best) { k } else { best });
-            let [p, q, r] = [0, 1, 2].map(|k| corners[(longest + k) % 3]);
-            let Some(&other) = across.get(&[q, p]) else {
-                continue;
-            };
-            let Some(s) = self.faces[other].into_iter().find(|c| ![p, q].contains(c)) else {
-                continue;
-            };
-            let new = [[p, s, r], [s, q, r]];
-            let is_sound = |t: [u32; 3]| {
-                doubled_area(t.map(|c| self.uv[c as usize])) > 0.0 && !self.is_collinear(t)
-            };
-            let is_new = self.vertex[r as usize] != self.vertex[s as usize]
-                && !edges.contains(&self.edge(r, s));
-            let is_first = !changed.contains(&f) && !changed.contains(&other);
-            if is_first && is_new && new.into_iter().all(is_sound) {
-                edges.remove(&self.edge(p, q));
-                edges.insert(self.edge(r, s));
-                changed.extend([f, other]);
-                [self.faces[f], self.faces[other]] = new;
+        loop {
+            let before = flat.len();
+            flat.retain(|&f| {
+                self.is_collinear(self.faces[f]) && !self.exchange(f, &mut edges, &mut across)
+            });
+            if flat.is_empty() || flat.len() == before {
+                return;
             }
         }
+    }
+
+    /// Puts the other diagonal into a flat face and the one across its longest edge, where both then have area.
+    fn exchange(
+        &mut self,
+        f: usize,
+        edges: &mut FxHashSet<[u32; 2]>,
+        across: &mut FxHashMap<[u32; 2], usize>,
+    ) -> bool {
+        let corners = self.faces[f];
+        let length = |k: usize| distance(self.place(corners[k]), self.place(corners[(k + 1) % 3]));
+        let longest = (0..3).fold(0, |best, k| if length(k) > length(best) { k } else { best });
+        let [p, q, r] = [0, 1, 2].map(|k| corners[(longest + k) % 3]);
+        let Some(&other) = across.get(&[q, p]) else {
+            return false;
+        };
+        let Some(s) = self.faces[other].into_iter().find(|c| ![p, q].contains(c)) else {
+            return false;
+        };
+        let new = [[p, s, r], [s, q, r]];
+        let is_sound = |t: [u32; 3]| {
+            doubled_area(t.map(|c| self.uv[c as usize])) > 0.0 && !self.is_collinear(t)
+        };
+        let is_new =
+            self.vertex[r as usize] != self.vertex[s as usize] && !edges.contains(&self.edge(r, s));
+        if !is_new || !new.into_iter().all(is_sound) {
+            return false;
+        }
+        edges.remove(&self.edge(p, q));
+        edges.insert(self.edge(r, s));
+        across.remove(&[p, q]);
+        across.remove(&[q, p]);
+        for (face, corners) in [f, other].into_iter().zip(new) {
+            for k in 0..3 {
+                across.insert([corners[k], corners[(k + 1) % 3]], face);
+            }
+            self.faces[face] = corners;
+        }
+        true
     }
 
     fn place(&self, corner: u32) -> [f64; 3] {
@@ -120,5 +142,44 @@ mod tests {
             );
             assert!(doubled_area(t.map(|c| uv[c as usize])) > 0.0, "{faces:?}");
         }
+    }
+
+    /// A flat arc of nine points in the plane, straight in space, under one more point: all but one face of it are without area.
+    #[test]
+    fn flat_faces_side_by_side_get_area_one_after_another() {
+        let arc = (0..9).map(|i| f64::from(i) / 4.0 - 1.0);
+        let mut positions: Vec<[f64; 3]> = arc.clone().map(|x| [x, 0.0, 0.0]).collect();
+        positions.push([0.0, 1.0, 0.0]);
+        let mut uv: Vec<[f64; 2]> = arc.map(|x| [x, 0.1 * (x * x - 1.0)]).collect();
+        uv.push([0.0, 1.0]);
+        // A zigzag from the arc's middle to its ends.
+        let mut faces = vec![[8, 9, 0]];
+        let (mut low, mut high) = (0, 8);
+        while high - low > 1 {
+            if low + high == 8 {
+                faces.push([low, low + 1, high]);
+                low += 1;
+            } else {
+                faces.push([low, high - 1, high]);
+                high -= 1;
+            }
+        }
+        // Those from which nothing can be done come first.
+        faces.reverse();
+        let vertex: Vec<u32> = (0..10).collect();
+        Faces {
+            positions: &positions,
+            vertex: &vertex,
+            uv: &uv,
+            faces: &mut faces,
+        }
+        .give_area();
+        let area = |t: &[u32; 3]| triangle_area(t.map(|c| positions[c as usize]));
+        assert!(faces.iter().all(|t| area(t) > 0.1), "{faces:?}");
+        assert!((faces.iter().map(area).sum::<f64>() - 1.0).abs() < 1e-12);
+        let plane = faces
+            .iter()
+            .map(|t| doubled_area(t.map(|c| uv[c as usize])));
+        assert!(plane.into_iter().all(|doubled| doubled > 0.0), "{faces:?}");
     }
 }

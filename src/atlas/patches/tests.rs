@@ -275,8 +275,11 @@ fn check_packing(l: &PatchLayout, params: &PatchParams) {
             }
         }
     }
-    // One texel of the packed square: all patches have their image's density in it.
-    let texel = |i: usize| l.patches[i].packed_scale * l.patches[i].texel_to_patch[0][0];
+    // Side of a square as large as a texel, in the packed square: all patches have their image's density in it.
+    let texel = |i: usize| {
+        let [[width, ..], [_, height, _]] = l.patches[i].texel_to_patch;
+        l.patches[i].packed_scale * (width * -height).sqrt()
+    };
     for i in 0..boxes.len() {
         assert!((texel(i) / texel(0) - 1.0).abs() < 1e-9);
         for j in 0..i {
