@@ -289,9 +289,10 @@ fn a_worker_that_an_engine_ends_with_the_run_is_cancelled_and_one_that_is_killed
     let root = tempfile::tempdir().unwrap();
     let end = |signal: &str, stopping: bool| {
         let script = format!("read job; kill -{signal} $$");
+        // What is run in the background of a script ignores interrupts, and so would the shell.
         let start = Start {
-            program: Path::new("/bin/sh"),
-            arguments: &["-c", &script],
+            program: Path::new("/usr/bin/env"),
+            arguments: &["--default-signal=INT", "/bin/sh", "-c", &script],
             output: root.path(),
             plan: None,
             threads: 1,
