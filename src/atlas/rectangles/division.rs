@@ -19,7 +19,7 @@ use std::collections::BinaryHeap;
 use std::f64::consts::PI;
 
 /// Parts with more sides are divided.
-const MOST_SIDES: usize = 6;
+pub(super) const MOST_SIDES: usize = 6;
 /// Parts in which some corner is seen less than this are divided.
 const VISIBLE: f64 = 0.004;
 /// Parts with fewer faces are too coarse to be called crowded.

@@ -4,12 +4,12 @@
 //! rectangles: each is sampled corner to corner, a full grid without a mask.
 //!
 //! ```text
-//! flat patches → sides and nodes → short sides contracted, walls drawn anew, division → divided by demand → the same again → middles → quads
+//! flat patches → sides and nodes → short sides contracted, walls drawn anew, division → small ones joined or not → divided by demand → the same again → middles → quads
 //! → Ricci flow of each → common parameter of walls → maps spread by stretch and bend → rectangles glued → charts carried over → numbers of samples
 //! ```
 //!
 //! What has n sides becomes n quads (`quads`), so that what decides about the images is where the walls are: short sides go (`contract`), walls meet at even
-//! angles (`relax`), patches with many or hidden corners are divided (`division`), and those that would hold the surface worst for their texels (`sizes`). Each quad
+//! angles (`relax`), patches with many or hidden corners are divided (`division`), and those that would hold the surface worst for their texels (`sizes`). Small patches are joined (`join`) where the images then turn out better: both are made to the end. Each quad
 //! is flattened by the same flow that made the cone metric, with π/2 at its four corners and nothing else (`flow`); its aspect ratio is its modulus,
 //! which cannot be chosen. The two conformal maps on both sides of a wall stretch it differently, and crowd it at corners: its parameter is its length in
 //! space, more where the surface bends (`density`, `walls`), and each quad is mapped to its rectangle with the border so given, harmonically at first and then so that no part is
@@ -33,6 +33,7 @@ mod division;
 mod flow;
 mod glue;
 mod harmonic;
+mod join;
 mod lift;
 mod place;
 mod quads;
@@ -166,10 +167,55 @@ pub fn rectangles(
     params: &PatchParams,
     curvature_tolerance: f64,
 ) -> Result<(Charted, PatchLayout), RectangleError> {
+    // Which division is better, only the images tell.
+    let with = |joins| divided(&surface, flat, params, curvature_tolerance, joins);
+    let (apart, joined) = rayon::join(|| with(false), || with(true));
+    let found = match (apart, joined) {
+        (Ok(Some(apart)), Ok(Some(joined))) if joined.error < apart.error => joined,
+        (Ok(Some(found)), _) | (_, Ok(Some(found))) => found,
+        (Err(error), _) | (_, Err(error)) => return Err(error),
+        (Ok(None), Ok(None)) => {
+            return Err(RectangleError::Inconsistent {
+                what: "two divisions",
+            });
+        }
+    };
+    tracing::debug!(
+        rectangles = found.layout.patches.len(),
+        least_height = found.least_height,
+        greatest_difference = found.greatest_difference,
+        "patches became rectangles"
+    );
+    Ok((found.surface, found.layout))
+}
+
+/// A surface in rectangles.
+struct Divided {
+    surface: Charted,
+    layout: PatchLayout,
+    /// The squared error that its images will have, integrated over the surface.
+    error: f64,
+    /// Of all rectangles.
+    least_height: f64,
+    /// Of opposite sides.
+    greatest_difference: f64,
+}
+
+/// Rectangles with small patches joined or all kept apart; nothing where none would be joined.
+fn divided(
+    surface: &Charted,
+    flat: &PatchLayout,
+    params: &PatchParams,
+    curvature_tolerance: f64,
+    joins: bool,
+) -> Result<Option<Divided>, RectangleError> {
     let mut drawing = Drawing::new(&surface.mesh, &surface.cut.is_cut, &flat.face_patch)?;
     contract::contract(&mut drawing)?;
     relax::relax(&mut drawing)?;
     division::divide(&mut drawing)?;
+    if joins && join::join(&mut drawing, params.texel_budget)? == 0 {
+        return Ok(None);
+    }
     sizes::divide(&mut drawing, params.texel_budget)?;
     contract::contract(&mut drawing)?;
     relax::relax(&mut drawing)?;
@@ -181,14 +227,8 @@ pub fn rectangles(
     let (flattened, added) = placed(&drawing.fine, &drawing.bend, &quads, curvature_tolerance)?;
     let least =
         |value: fn(&Rectangle) -> f64| flattened.iter().map(value).fold(f64::INFINITY, f64::min);
-    tracing::debug!(
-        rectangles = flattened.len(),
-        least_height = least(|r| r.height),
-        greatest_difference = -least(|r| -r.unequal),
-        "patches became rectangles"
-    );
     let (fine, face_patch) = glue::glue(&drawing.fine, &flattened, &added)?;
-    let surface = lift::lift(surface, &fine);
+    let surface = lift::lift(surface.clone(), &fine);
     let c = &fine.connectivity;
     let uv: FaceVec<[[f64; 2]; 3]> = c
         .faces()
@@ -212,7 +252,13 @@ pub fn rectangles(
         &layout.face_patch,
         &layout.uv,
     );
-    Ok((surface, layout))
+    Ok(Some(Divided {
+        error: Strips::error(&bends, &samples),
+        least_height: least(|r| r.height),
+        greatest_difference: -least(|r| -r.unequal),
+        surface,
+        layout,
+    }))
 }
 
 /// How the surface bends along the sides of every quad, as images of even texels see it.

@@ -1,22 +1,25 @@
 //! Large patches divided, so that rectangles hold the surface about equally well.
 //!
 //! *Enters:* a [`Drawing`], and a budget of texels. *Leaves:* more walls on it. *Guaranteed:* every part is a disk. *Not guaranteed:* the best of all divisions.
+//! What small patches cost is foreseen here as well, and [`join`](super::join) makes them fewer.
 //!
 //! Strips of rectangles wander over the whole surface, so nearly all rectangles have as many samples: how densely a place is sampled is decided by how large the
 //! rectangles there are. A patch of n sides becomes n of them; with area A its texels are √(A / n) long, in some unit, and its squared error is about b (A / n)^{3/2}, where b is the bend of
 //! its edges (θ² L, as in `patches::demand`). Each division makes some rectangles more, with fewer texels for all others. It is made where the sum of errors falls by it.
 
 use super::RectangleError;
+use super::disk::Disk;
 use super::division::{best_line, draw_between, part, places, regions};
 use super::sides::{Drawing, Role};
 use crate::geometry::ids::FaceId;
 use crate::geometry::triangle::area;
 
-/// Decibels that a division must gain.
-const LEAST_GAIN: f64 = 0.03;
+/// Decibels that a division must gain, or a join.
+pub(super) const LEAST_GAIN: f64 = 0.03;
 /// Divisions in one round are those that gain at least this part of what the best one gains: the others are judged again.
 const SHARE: f64 = 0.5;
-const ROUNDS: usize = 24;
+/// How often all patches are looked at.
+pub(super) const ROUNDS: usize = 24;
 /// Quads that a division adds: six, for its line and two sides of neighbours are each counted on both sides, less what becomes of short sides.
 const ADDED: f64 = 4.0;
 /// Where nothing bends, texels are at most about twice as long as the mean: errors are equal where they follow the bend to the power of −1/5.
@@ -25,39 +28,97 @@ const FLOOR: f64 = 1.0 / 32.0;
 const LEAST_FACES: usize = 12;
 
 /// A patch as its rectangles see it.
-struct Size {
-    start: FaceId,
-    sides: f64,
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Size {
+    pub sides: f64,
+    /// Bend, over the patch.
+    pub bend: f64,
+    pub area: f64,
+    /// Length of its border.
+    pub border: f64,
+}
+
+impl Size {
     /// Squared error, if its rectangles had one texel each.
-    error: f64,
+    pub fn error(&self) -> f64 {
+        self.error_of(self.sides, 1.5)
+    }
+
     /// The same if it were divided.
-    divided: f64,
+    fn divided(&self) -> f64 {
+        self.error_of(self.sides + ADDED, 0.75)
+    }
+
+    fn error_of(&self, rectangles: f64, by_length: f64) -> f64 {
+        // Four for a square: long patches have long rectangles, whose longer texels decide.
+        let long = (self.border / (4.0 * self.area.sqrt())).max(1.0);
+        let error = self.bend * (self.area / rectangles).powf(1.5) * long.powf(by_length);
+        if error.is_finite() { error } else { 0.0 }
+    }
+}
+
+/// Squared error of all, and their rectangles.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Total {
+    pub error: f64,
+    pub rectangles: f64,
+}
+
+impl Total {
+    pub fn of<'a>(sizes: impl Iterator<Item = &'a Size>) -> Self {
+        let zero = Self {
+            error: 0.0,
+            rectangles: 0.0,
+        };
+        sizes.fold(zero, |sum, size| Self {
+            error: sum.error + size.error(),
+            rectangles: sum.rectangles + size.sides,
+        })
+    }
+
+    /// Decibels of the squared error that are gained if this becomes `other`.
+    pub fn gain(&self, other: Self, budget: usize) -> f64 {
+        let before = self.with(budget);
+        let gain = 10.0 * (before / other.with(budget)).log10();
+        // Rounded: the last digits must not decide.
+        let gain = (gain * 1e6).round() / 1e6;
+        if gain.is_finite() { gain } else { 0.0 }
+    }
+
+    /// Squared error of rectangles that have equal shares of a budget. One row and column of each lie on its border twice.
+    fn with(&self, budget: usize) -> f64 {
+        let samples = (budget as f64 / self.rectangles).sqrt();
+        self.error / (samples - 1.0).max(1.0).powi(3)
+    }
 }
 
 /// Divides until nothing is gained.
 pub(super) fn divide(drawing: &mut Drawing, budget: usize) -> Result<(), RectangleError> {
-    let floor = FLOOR * mean_bend(drawing);
+    let floor = floor(drawing);
     for _ in 0..ROUNDS {
-        let sizes: Vec<Size> = regions(drawing)
-            .into_iter()
-            .map(|start| size(drawing, start, floor))
-            .collect::<Result<_, _>>()?;
-        let quads: f64 = sizes.iter().map(|s| s.sides).sum();
-        let error: f64 = sizes.iter().map(|s| s.error).sum();
-        let before = total(error, quads, budget);
-        let gain = |s: &Size| {
-            let after = total(error - s.error + s.divided, quads + ADDED, budget);
-            // Rounded: the last digits must not decide.
-            let gain = (10.0 * (before / after).log10() * 1e6).round() / 1e6;
-            if gain.is_finite() { gain } else { 0.0 }
+        let found = regions(drawing).into_iter().map(|start| {
+            let disk = part(drawing, start)?;
+            let size = size(drawing, &disk, floor);
+            Ok((start, size, disk.faces.len() >= LEAST_FACES))
+        });
+        let found: Vec<(FaceId, Size, bool)> = found.collect::<Result<_, RectangleError>>()?;
+        let before = Total::of(found.iter().map(|(_, size, _)| size));
+        let gain = |&(_, size, has_room): &(FaceId, Size, bool)| {
+            let after = Total {
+                error: before.error - size.error() + size.divided(),
+                rectangles: before.rectangles + ADDED,
+            };
+            if has_room {
+                before.gain(after, budget)
+            } else {
+                0.0
+            }
         };
-        let best = sizes.iter().map(gain).fold(0.0, f64::max);
+        let best = found.iter().map(gain).fold(0.0, f64::max);
         let mut drawn = 0;
-        for size in sizes
-            .iter()
-            .filter(|s| gain(s) >= (SHARE * best).max(LEAST_GAIN))
-        {
-            let mut disk = part(drawing, size.start)?;
+        let worth = (SHARE * best).max(LEAST_GAIN);
+        for (start, ..) in found.iter().filter(|one| gain(one) >= worth) {
+            let mut disk = part(drawing, *start)?;
             let first = places(drawing, &disk, |role| role == Role::Node).next();
             disk.border.rotate_left(first.unwrap_or(0));
             if let Some(line) = best_line(drawing, &disk, true)? {
@@ -72,20 +133,19 @@ pub(super) fn divide(drawing: &mut Drawing, budget: usize) -> Result<(), Rectang
     Ok(())
 }
 
-/// Squared error of rectangles that have equal shares of a budget. One row and column of each lie on its border twice.
-fn total(error: f64, quads: f64, budget: usize) -> f64 {
-    let samples = (budget as f64 / quads).sqrt();
-    error / (samples - 1.0).max(1.0).powi(3)
-}
-
-fn mean_bend(drawing: &Drawing) -> f64 {
+/// The least bend that a place counts as having.
+pub(super) fn floor(drawing: &Drawing) -> f64 {
     let (mut bend, mut whole) = (0.0, 0.0);
     for f in drawing.fine.connectivity.faces() {
         let area = face_area(drawing, f);
         bend += area * drawing.bend[drawing.fine.parent[f]];
         whole += area;
     }
-    if whole > 0.0 { bend / whole } else { 0.0 }
+    if whole > 0.0 {
+        FLOOR * bend / whole
+    } else {
+        0.0
+    }
 }
 
 fn face_area(drawing: &Drawing, f: FaceId) -> f64 {
@@ -94,28 +154,19 @@ fn face_area(drawing: &Drawing, f: FaceId) -> f64 {
     area(lengths).unwrap_or(0.0)
 }
 
-fn size(drawing: &Drawing, start: FaceId, floor: f64) -> Result<Size, RectangleError> {
-    let disk = part(drawing, start)?;
-    let sides = places(drawing, &disk, |role| role == Role::Node).count() as f64;
-    let (mut bend, mut whole) = (0.0, 0.0);
+pub(super) fn size(drawing: &Drawing, disk: &Disk, floor: f64) -> Size {
+    let mut size = Size {
+        sides: places(drawing, disk, |role| role == Role::Node).count() as f64,
+        ..Size::default()
+    };
     for &f in &disk.faces {
         let area = face_area(drawing, f);
-        bend += area * drawing.bend[drawing.fine.parent[f]].max(floor);
-        whole += area;
+        size.bend += area * drawing.bend[drawing.fine.parent[f]].max(floor);
+        size.area += area;
     }
     let border = disk.border.iter();
-    let perimeter: f64 = border
+    size.border = border
         .map(|&h| drawing.fine.edge_length(disk.edge(&drawing.fine, h)))
         .sum();
-    // Four for a square: long patches have long rectangles, whose longer texels decide.
-    let long = (perimeter / (4.0 * whole.sqrt())).max(1.0);
-    let error = bend * (whole / sides).powf(1.5) * long.powf(1.5);
-    let divided = bend * (whole / (sides + 4.0)).powf(1.5) * long.powf(0.75);
-    let is_fine = error.is_finite() && divided.is_finite() && disk.faces.len() >= LEAST_FACES;
-    Ok(Size {
-        start,
-        sides,
-        error: if is_fine { error } else { 0.0 },
-        divided: if is_fine { divided } else { 0.0 },
-    })
+    size
 }

@@ -3,7 +3,7 @@
 use super::super::disk::Disk;
 use super::super::division::{part, places, regions};
 use super::super::sides::Role;
-use super::super::{contract, relax, sizes};
+use super::super::{contract, join, relax, sizes};
 use super::*;
 
 /// Length of the walls that stay, sides of patches in ascending order, length of the shortest side.
@@ -169,4 +169,42 @@ fn walls_drawn_anew_keep_patches_and_sides_and_meet_more_evenly() {
             assert!(way > 1.0 / 3.0, "{before:?} {after:?}");
         }
     }
+}
+
+/// The squared error that is foreseen, and the rectangles.
+fn foreseen(drawing: &Drawing) -> sizes::Total {
+    let floor = sizes::floor(drawing);
+    let all = regions(drawing)
+        .into_iter()
+        .map(|start| sizes::size(drawing, &part(drawing, start).unwrap(), floor));
+    sizes::Total::of(all.collect::<Vec<_>>().iter())
+}
+
+#[test]
+fn joined_patches_are_disks_and_fewer_where_texels_are_few() {
+    let mut drawing = bricks();
+    let before = state(&drawing);
+    // Nothing bends, so nothing is lost or won.
+    assert_eq!(join::join(&mut drawing, 1).unwrap(), 0);
+    for bend in drawing.bend.as_mut_slice() {
+        *bend = 1.0;
+    }
+    let most = before
+        .sides
+        .last()
+        .map_or(0, |&n| n.max(division::MOST_SIDES));
+    let mut gone = Vec::new();
+    for budget in [100_000_000, 4000, 400] {
+        let foreseen_before = foreseen(&drawing);
+        gone.push(join::join(&mut drawing, budget).unwrap());
+        let after = state(&drawing);
+        let so_far: usize = gone.iter().sum();
+        assert_eq!(after.sides.len() + so_far, before.sides.len());
+        assert!(after.sides.iter().all(|&n| n <= most), "{after:?}");
+        assert!(close(before.fixed, after.fixed), "{before:?} {after:?}");
+        let gained = foreseen_before.gain(foreseen(&drawing), budget);
+        assert!(gained >= 0.0, "{budget}: {gained} dB");
+    }
+    // With so many texels, what rectangles share is next to nothing: only slivers go.
+    assert!(gone[1] + gone[2] > 2 * gone[0], "{gone:?}");
 }
