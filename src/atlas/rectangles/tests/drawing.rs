@@ -5,6 +5,7 @@ use super::super::division::{part, places, regions};
 use super::super::sides::Role;
 use super::super::{contract, join, relax, sizes};
 use super::*;
+use crate::geometry::ids::FaceId;
 
 /// Length of the walls that stay, sides of patches in ascending order, length of the shortest side.
 #[derive(Debug)]
@@ -74,8 +75,8 @@ fn state(drawing: &Drawing) -> State {
     }
 }
 
-/// Patches laid like bricks on a sheet, in courses each of which is shifted by a quarter of a brick: walls meet at straight angles, a short side apart.
-fn bricks() -> Drawing {
+/// A sheet of 24 × 24 shaken squares in patches, by where the middle of a face lies.
+fn sheet(patch: impl Fn([f64; 2]) -> [i32; 2]) -> Drawing {
     let squares = (0..24 * 24).map(|i| [i % 24, i / 24, 0]);
     let mut mesh = polycube(squares, |_, axis, sign| axis == 2 && sign == 1);
     for (v, p) in mesh.positions.as_mut_slice().iter_mut().enumerate() {
@@ -83,21 +84,34 @@ fn bricks() -> Drawing {
         p[1] += 0.2 * (78.233 * v as f64).sin();
     }
     let c = &mesh.connectivity;
-    let brick = |f| {
-        let p = mesh.face_positions(f);
-        let middle = [0, 1].map(|i| (p[0][i] + p[1][i] + p[2][i]) / 3.0);
-        let course = (middle[1] / 8.0).floor();
-        let place = ((middle[0] - 2.0 * course) / 8.0).floor();
-        (course as i32, place as i32)
-    };
     let mut number = BTreeMap::new();
     let numbered = c.faces().map(|f| {
+        let p = mesh.face_positions(f);
+        let middle = [0, 1].map(|i| (p[0][i] + p[1][i] + p[2][i]) / 3.0);
         let next = number.len();
-        PatchId::new(*number.entry(brick(f)).or_insert(next))
+        PatchId::new(*number.entry(patch(middle)).or_insert(next))
     });
     let face_patch: FaceVec<PatchId> = numbered.collect();
     let is_cut = crate::geometry::ids::EdgeVec::filled(false, c.edge_count());
     Drawing::new(&mesh, &is_cut, &face_patch).unwrap()
+}
+
+/// Patches laid like bricks, in courses each of which is shifted by a quarter of a brick: walls meet at straight angles, a short side apart.
+fn bricks() -> Drawing {
+    sheet(|[x, y]| {
+        let course = (y / 8.0).floor();
+        let place = ((x - 2.0 * course) / 8.0).floor();
+        [course, place].map(|i| i as i32)
+    })
+}
+
+/// Squares like those of a chessboard, halved across or upright by their colour: three walls meet where one ends.
+fn halves() -> Drawing {
+    sheet(|p| {
+        let [x, y] = p.map(|x| (x / 8.0).floor() as i32);
+        let within = p[usize::from((x + y) % 2 == 0)].rem_euclid(8.0);
+        [3 * y + x, i32::from(within > 4.0)]
+    })
 }
 
 /// With many creases, and with none.
@@ -174,37 +188,45 @@ fn walls_drawn_anew_keep_patches_and_sides_and_meet_more_evenly() {
 /// The squared error that is foreseen, and the rectangles.
 fn foreseen(drawing: &Drawing) -> sizes::Total {
     let floor = sizes::floor(drawing);
-    let all = regions(drawing)
-        .into_iter()
-        .map(|start| sizes::size(drawing, &part(drawing, start).unwrap(), floor));
-    sizes::Total::of(all.collect::<Vec<_>>().iter())
+    let size = |start| sizes::size(drawing, &part(drawing, start).unwrap(), floor);
+    let all: Vec<sizes::Size> = regions(drawing).into_iter().map(size).collect();
+    sizes::Total::of(all.iter())
 }
 
 #[test]
-fn joined_patches_are_disks_and_fewer_where_texels_are_few() {
-    let mut drawing = bricks();
-    let before = state(&drawing);
-    // Nothing bends, so nothing is lost or won.
-    assert_eq!(join::join(&mut drawing, 1).unwrap(), 0);
-    for bend in drawing.bend.as_mut_slice() {
-        *bend = 1.0;
-    }
-    let most = before
-        .sides
-        .last()
-        .map_or(0, |&n| n.max(division::MOST_SIDES));
-    let mut gone = Vec::new();
-    for budget in [100_000_000, 4000, 400] {
-        let foreseen_before = foreseen(&drawing);
-        gone.push(join::join(&mut drawing, budget).unwrap());
-        let after = state(&drawing);
-        let so_far: usize = gone.iter().sum();
-        assert_eq!(after.sides.len() + so_far, before.sides.len());
-        assert!(after.sides.iter().all(|&n| n <= most), "{after:?}");
-        assert!(close(before.fixed, after.fixed), "{before:?} {after:?}");
-        let gained = foreseen_before.gain(foreseen(&drawing), budget);
-        assert!(gained >= 0.0, "{budget}: {gained} dB");
-    }
-    // With so many texels, what rectangles share is next to nothing: only slivers go.
-    assert!(gone[1] + gone[2] > 2 * gone[0], "{gone:?}");
+fn halves_are_joined_where_nothing_bends() {
+    const BUDGET: usize = 10_000;
+    let mut drawing = halves();
+    // Where nothing bends at all, nothing is lost or won.
+    assert_eq!(join::join(&mut drawing, BUDGET).unwrap(), 0);
+    let c = &drawing.fine.connectivity;
+    let x = |f| c.face_vertices(f).map(|v| drawing.fine.position[v][0]);
+    let is_bent: FaceVec<bool> = c.faces().map(|f| x(f).iter().sum::<f64>() > 36.0).collect();
+    drawing.bend = is_bent
+        .iter()
+        .map(|&bent| if bent { 100.0 } else { 0.01 })
+        .collect();
+    let bent = |drawing: &Drawing| {
+        let is_bent = |f: &FaceId| is_bent[drawing.fine.parent[*f]];
+        let parts = regions(drawing).into_iter();
+        let parts = parts.map(|start| part(drawing, start).unwrap());
+        parts.filter(|disk| disk.faces.iter().all(is_bent)).count()
+    };
+    let (before, foreseen_before) = (state(&drawing), foreseen(&drawing));
+    let bent_before = bent(&drawing);
+    let gone = join::join(&mut drawing, BUDGET).unwrap();
+    let after = state(&drawing);
+    assert!(foreseen_before.gain(foreseen(&drawing), BUDGET) > 0.0);
+    assert_eq!(before.sides.len(), 18);
+    assert_eq!(after.sides.len() + gone, 18);
+    // Three squares lie where nothing bends.
+    assert!(gone >= 3, "{gone}");
+    assert!(
+        after.sides.iter().all(|&n| n <= division::MOST_SIDES),
+        "{after:?}"
+    );
+    assert!(close(before.fixed, after.fixed), "{before:?} {after:?}");
+    // What bends is divided as it was.
+    assert!(bent_before >= 6, "{bent_before}");
+    assert_eq!(bent(&drawing), bent_before);
 }
