@@ -136,7 +136,7 @@ fn theirs(mesh: &Mesh, side: usize) -> Result<Found, Box<dyn Error>> {
         let Some(over @ 1..) = texels.checked_sub(side * side) else {
             break;
         };
-        params.texel_budget -= over;
+        params.texel_budget = params.texel_budget.saturating_sub(over).max(1);
         layout = charts_of(mesh, &uv, &params)?;
     }
     let log_scale = VertexVec::filled(0.0, mesh.connectivity.vertex_count());
