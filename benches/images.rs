@@ -15,6 +15,7 @@ use affine_atlas::geometry::ids::{FaceVec, VertexVec};
 use affine_atlas::geometry::mesh::{AttributeKind, Mesh, Soup};
 use affine_atlas::rebuild::{Images, rebuild};
 use affine_atlas::{job, read, repair};
+use std::collections::HashSet;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
@@ -72,13 +73,15 @@ fn main() -> Result<(), Box<dyn Error>> {
 struct Found {
     patches: usize,
     texels: usize,
+    /// Vertices of the rebuilt mesh that are in no image: points of seams.
+    beside: usize,
     psnr: f64,
 }
 
 fn row(name: &str, atlas: &str, of: impl Fn(usize) -> Result<Found, Box<dyn Error>>) {
     let found = SIDES.map(of);
     let cells = found.each_ref().map(|found| match found {
-        Ok(f) => format!("{}, {:.2}", f.texels, f.psnr),
+        Ok(f) => format!("{} + {}, {:.2}", f.texels, f.beside, f.psnr),
         Err(e) => e.to_string(),
     });
     let patches = found.iter().flatten().map(|f| f.patches).max();
@@ -157,7 +160,15 @@ fn measure(source: &Mesh, layout: &PatchLayout, images: &Images) -> Result<Found
         faces: &rebuilt.faces,
     };
     let found = deviation(given, made, SAMPLING).ok_or("no area")?;
+    let bits = |p: [f32; 3]| p.map(f32::to_bits);
+    let stored = images.patches.iter().flat_map(|p| p.position);
+    let stored: HashSet<[u32; 3]> = stored.map(|&p| bits(p)).collect();
+    let is_beside = |p: &&[f64; 3]| {
+        let local = std::array::from_fn(|k| (p[k] - images.origin[k]) as f32);
+        !stored.contains(&bits(local))
+    };
     Ok(Found {
+        beside: rebuilt.positions.iter().filter(is_beside).count(),
         patches: layout.patches.len(),
         texels: layout.patches.iter().map(|p| p.width * p.height).sum(),
         psnr: found.psnr(source.diagonal()).unwrap_or(f64::INFINITY),

@@ -12,8 +12,12 @@ use crate::atlas::patches::MAX_SIDE;
 
 /// Where nothing bends, texels are of use to normals and to what is laid over the images: none is longer than so many even ones.
 const COARSEST: f64 = 2.0;
-/// Halvings of an interval of logarithms that may span all of float64.
+/// Halvings of the interval of prices, in logarithms.
 const HALVINGS: usize = 60;
+/// Most steps of Newton's method, which needs a handful.
+const STEPS: usize = 60;
+/// Numbers of intervals are wanted to this part of themselves.
+const PRECISE: f64 = 1e-12;
 /// The numbers are found when they move by less than this part of themselves.
 const SETTLED: f64 = 1e-4;
 /// Numbers settle long before; this many rounds would be spent on numbers that round alike.
@@ -117,7 +121,7 @@ impl Shares {
         for _ in 0..ROUNDS {
             let mut moved = 0.0f64;
             for (s, crossed) in crossed.iter().enumerate() {
-                // The derivative by the logarithm of k is price · k · width − fourth / k⁴ − second / k².
+                // The derivative by the logarithm of k is cost · k − fourth / k⁴ − second / k².
                 let (mut fourth, mut second, mut width) = (0.0, 0.0, 0.0);
                 for &(image, k) in crossed {
                     let other = intervals[self.of_image[image][1 - k]];
@@ -126,17 +130,8 @@ impl Shares {
                     second += 2.0 * bend.twist / (other * other);
                     width += other + self.border;
                 }
-                let gains = |k: f64| (fourth / (k * k) + second) / (k * k) > price * k * width;
-                let [mut low, mut high] = [least[s], self.most()].map(f64::ln);
-                for _ in 0..HALVINGS {
-                    let middle = 0.5 * (low + high);
-                    if gains(middle.exp()) {
-                        low = middle;
-                    } else {
-                        high = middle;
-                    }
-                }
-                let found = low.exp();
+                let found = stationary(fourth, second, price * width);
+                let found = found.max(least[s]).min(self.most());
                 moved = moved.max((found / intervals[s] - 1.0).abs());
                 intervals[s] = found;
             }
@@ -165,5 +160,48 @@ impl Shares {
 
     fn most(&self) -> f64 {
         MAX_SIDE as f64 - self.border
+    }
+}
+
+/// The k > 0 for which cost · k⁵ = second · k² + fourth, none of them negative; 0 where nothing is gained.
+fn stationary(fourth: f64, second: f64, cost: f64) -> f64 {
+    // Either term is at most half of the left here, so this is no less than the root; from there on the difference is convex, and Newton's method falls to the root.
+    let mut k = (2.0 * fourth / cost)
+        .powf(0.2)
+        .max((2.0 * second / cost).cbrt());
+    for _ in 0..STEPS {
+        let cube = k * k * k;
+        let slope = 5.0 * cost * cube * k - 2.0 * second * k;
+        let step = (cost * cube * k * k - second * k * k - fourth) / slope;
+        if !(step > PRECISE * k) {
+            break;
+        }
+        k -= step;
+    }
+    k
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stationary_numbers_solve_their_equation() {
+        let values = [0.0, 1e-30, 1e-9, 0.3, 7.0, 1e12];
+        for fourth in values {
+            for second in values {
+                for cost in [1e-20, 1e-3, 5.0, 1e15] {
+                    let k = stationary(fourth, second, cost);
+                    let gain = |k: f64| (fourth / (k * k) + second) / (k * k) - cost * k;
+                    if fourth == 0.0 && second == 0.0 {
+                        assert_eq!(k, 0.0);
+                        continue;
+                    }
+                    let name = format!("{fourth} {second} {cost}: {k}");
+                    assert!(gain(k * (1.0 - 1e-9)) > 0.0, "{name}");
+                    assert!(gain(k * (1.0 + 1e-9)) < 0.0, "{name}");
+                }
+            }
+        }
     }
 }
