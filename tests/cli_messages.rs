@@ -222,6 +222,15 @@ fn unknown_preset() {
 }
 
 #[test]
+fn rectangles_on_a_lattice() {
+    let text = "[patches]\nshared_lattice = true\n[images]\ndomain = \"rectangle\"\n";
+    insta::assert_snapshot!(config_refusal(text), @r#"
+     error: `patches.shared_lattice` is for flat images, but `images.domain` is "rectangle"
+     help: set `images.domain = "flat"`, or leave `patches.shared_lattice` out
+    "#);
+}
+
+#[test]
 fn packed_rectangles() {
     let text = "preset = \"omage-1024\"\n[images]\ndomain = \"rectangle\"\n";
     insta::assert_snapshot!(config_refusal(text), @r#"

@@ -25,6 +25,16 @@ use std::path::{Path, PathBuf};
 /// Side of the budget at which atlases are given to the independent checker: walls of rectangles depend on it.
 const CHECKED: usize = 256;
 
+/// What images are sampled over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Texels {
+    /// Patches of the flat metric, each with texels of its own.
+    Flat,
+    /// Patches of the flat metric with texels on one lattice.
+    Lattice,
+    Rectangle,
+}
+
 /// Models whose faces are far smaller than the largest texels and far larger than the smallest.
 const PIECEWISE_LINEAR: [&str; 5] = [
     "spot.obj",
@@ -46,11 +56,12 @@ fn main() {
     let folder = corpus.unwrap_or_default();
     let mut trials = Vec::new();
     for (file, genus, loops) in CLEAN {
-        let flat = [512, 256, 64].map(|side| (Domain::Flat, side));
-        for (domain, side) in flat.into_iter().chain([(Domain::Rectangle, 256)]) {
+        let flat = [512, 256, 64].map(|side| (Texels::Flat, side));
+        let others = [(Texels::Rectangle, CHECKED), (Texels::Lattice, CHECKED)];
+        for (texels, side) in flat.into_iter().chain(others) {
             let model = folder.join(file);
-            let run = move || watertight(&model, domain, side, genus, loops);
-            let name = format!("watertight/{domain:?}/{side}/{file}");
+            let run = move || watertight(&model, texels, side, genus, loops);
+            let name = format!("watertight/{texels:?}/{side}/{file}");
             trials.push(Trial::test(name, run));
         }
     }
@@ -69,14 +80,18 @@ fn main() {
 /// The mesh as it is read back from its file, without welding: a surface of the right topology. In memory: no face is flipped.
 fn watertight(
     model: &Path,
-    domain: Domain,
+    texels: Texels,
     side: usize,
     genus: usize,
     loops: usize,
 ) -> Result<(), Failed> {
     let folder = tempfile::tempdir()?;
     let mut config = Config::default();
-    config.images.domain = domain;
+    config.images.domain = match texels {
+        Texels::Flat | Texels::Lattice => Domain::Flat,
+        Texels::Rectangle => Domain::Rectangle,
+    };
+    config.patches.shared_lattice = texels == Texels::Lattice;
     config.patches.texel_budget = side * side;
     config.pictures.enabled = false;
     let outcome = job::run(model, "model", folder.path(), "asset", &config, &());
@@ -105,9 +120,9 @@ fn watertight(
         triangle_area(corners) == 0.0
     });
     // In a crowded corner of a rectangle texels are so close to each other that float32 cannot tell three of them from a line.
-    let flat = match domain {
-        Domain::Flat => flat.count(),
-        Domain::Rectangle => 0,
+    let flat = match texels {
+        Texels::Flat | Texels::Lattice => flat.count(),
+        Texels::Rectangle => 0,
     };
     if (found.genus, found.boundary_loops, flipped, flat) != (genus as i64, loops, 0, 0) {
         return Err(format!("{found:?}, {flipped} flipped, {flat} without area").into());

@@ -185,11 +185,14 @@ pub enum ConfigError {
     /// Both ways of naming cones.
     #[error("`cones.list` and `cones.file` both name cones")]
     ListAndFile,
-    /// One image of all patches, but patches that are not flat.
-    #[error(
-        "`patches.packed_side` packs flat images into one, but `images.domain` is \"rectangle\""
-    )]
-    PackedRectangles,
+    /// A key for flat images, but patches that are not flat.
+    #[error("`{key}` {does}, but `images.domain` is \"rectangle\"")]
+    OnlyFlat {
+        /// The key.
+        key: &'static str,
+        /// What it does with flat images.
+        does: &'static str,
+    },
     /// A key of an `[[asset]]` table that no single mesh can have.
     #[error("{at}: `{key}` concerns the whole run and not single meshes")]
     NotForOneAsset {
@@ -228,7 +231,7 @@ impl ConfigError {
             | Self::TooLong { .. }
             | Self::NoConeFile { .. }
             | Self::ListAndFile
-            | Self::PackedRectangles
+            | Self::OnlyFlat { .. }
             | Self::OverrideWithoutValue { .. } => None,
             Self::Syntax { at, .. }
             | Self::ConeLine { at, .. }
@@ -266,8 +269,8 @@ impl ConfigError {
                  radians, for example `17 1.570796`; `cones.file_first_vertex` says where numbers begin"
                 .to_owned(),
             Self::ListAndFile => "remove one of them".to_owned(),
-            Self::PackedRectangles => {
-                "set `images.domain = \"flat\"`, or leave `patches.packed_side` out".to_owned()
+            Self::OnlyFlat { key, .. } => {
+                format!("set `images.domain = \"flat\"`, or leave `{key}` out")
             }
             Self::NotForOneAsset { .. } => {
                 "write it outside of the `[[asset]]` tables".to_owned()

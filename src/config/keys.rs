@@ -450,6 +450,7 @@ pub const KEYS: &[Key] = &[
         "texels",
         "absent",
     ),
+    key("patches.shared_lattice", Kind::Bool, "", "false"),
     key(
         "images.domain",
         Kind::Choice(&["flat", "rectangle"]),

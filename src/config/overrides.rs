@@ -91,11 +91,23 @@ impl Layers {
         let nowhere = Source::new("configuration", "");
         let source = self.last.as_ref().unwrap_or(&nowhere);
         let config = config.map_err(|error| refused(source, &error))?;
-        match (config.images.domain, config.patches.packed_side) {
-            (Domain::Rectangle, Some(_)) => Err(ConfigError::PackedRectangles),
+        match only_flat(&config) {
+            Some((key, does)) if config.images.domain == Domain::Rectangle => {
+                Err(ConfigError::OnlyFlat { key, does })
+            }
             _ => Ok(config),
         }
     }
+}
+
+/// A key that is given and means nothing but for flat images, and what it does with them.
+fn only_flat(config: &Config) -> Option<(&'static str, &'static str)> {
+    let patches = &config.patches;
+    if patches.packed_side.is_some() {
+        return Some(("patches.packed_side", "packs flat images into one"));
+    }
+    let shared = ("patches.shared_lattice", "is for flat images");
+    patches.shared_lattice.then_some(shared)
 }
 
 /// Takes the `[[asset]]` tables out of a layer whose keys have been checked.

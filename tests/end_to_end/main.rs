@@ -10,6 +10,7 @@ mod flows;
 mod good;
 #[cfg(unix)]
 mod interrupt;
+mod lattice;
 mod packed;
 mod prescriptions;
 mod rebuild;

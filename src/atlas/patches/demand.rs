@@ -111,10 +111,21 @@ impl Demand {
 /// What images of these patches may have together, so that they hold `params.texel_budget`. `least` says how wide a texel of each may be at the most.
 pub(super) fn budget(demands: &[Demand], least: &[f64], params: &PatchParams) -> Budget {
     let margin = params.padding as f64;
+    let texels = |i: usize, texel: f64| demands[i].texels(texel.min(least[i]), margin);
+    budget_of(demands, params, texels)
+}
+
+/// The same where the image of a patch has so many texels when those of this width are worth it.
+pub(super) fn budget_of(
+    demands: &[Demand],
+    params: &PatchParams,
+    texels: impl Fn(usize, f64) -> f64,
+) -> Budget {
+    let margin = params.padding as f64;
     let most = params.texel_budget as f64;
     let fits = |budget: &Budget| {
-        let rows = demands.iter().zip(least);
-        let texels = rows.map(|(d, &least)| d.texels(d.texel(budget).min(least), budget.margin));
+        let rows = demands.iter().enumerate();
+        let texels = rows.map(|(i, d)| texels(i, d.texel(budget)));
         texels.sum::<f64>() <= most
     };
     let area: f64 = demands.iter().map(|d| d.sums.area).sum();

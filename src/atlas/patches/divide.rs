@@ -123,7 +123,7 @@ impl<'a> Divider<'a> {
             let Scratch { sets, own, .. } = scratch;
             let (sums, border) = self.sums_and_border(faces, sets);
             let placement = self.placed(faces, &border, sets, own);
-            Outline::new(self.slit, sums, &border, &placement).demand
+            self.outline(sums, &border, &placement).demand
         };
         let rows = patches.par_iter();
         let demands = rows.map_init(|| Scratch::new(self.slit), demand);
@@ -203,7 +203,7 @@ impl<'a> Divider<'a> {
         let Scratch { sets, label, own } = scratch;
         let (sums, border) = self.sums_and_border(&faces, sets);
         let placement = self.placed(&faces, &border, sets, own);
-        let outline = Outline::new(slit, sums, &border, &placement);
+        let outline = self.outline(sums, &border, &placement);
         let now = self.cost(&outline.demand);
         let mut tried = Vec::new();
         for side in self.by_creases(&faces, sets, label) {
@@ -254,7 +254,7 @@ impl<'a> Divider<'a> {
         let mut borders = Vec::with_capacity(parts.len());
         for faces in &parts {
             let (sums, border) = self.sums_and_border(faces, sets);
-            let outline = Outline::new(self.slit, sums, &border, placement);
+            let outline = self.outline(sums, &border, placement);
             saved -= self.cost(&outline.demand);
             borders.push(border);
             if saved <= 0.0 {
@@ -288,6 +288,19 @@ impl<'a> Divider<'a> {
         (sums, border)
     }
 
+    /// What a patch with these faces on its border asks for.
+    fn outline(&self, sums: Sums, border: &[FaceId], placement: &Placement) -> Outline {
+        let border = border.iter().map(|&f| placement.triangle(self.slit, f));
+        let border: Vec<Triangle> = border.collect();
+        let rectangle = smallest(&border, self.params.directions());
+        let sides = [rectangle.width, rectangle.width * rectangle.height];
+        Outline {
+            demand: Demand { sums, sides },
+            angle: wrap_angle(rectangle.angle),
+            border,
+        }
+    }
+
     /// Error and texels, as if they were one.
     fn cost(&self, demand: &Demand) -> f64 {
         let texel = demand
@@ -307,20 +320,6 @@ struct Outline {
     angle: f64,
     /// The faces that have a side on the border.
     border: Vec<Triangle>,
-}
-
-impl Outline {
-    fn new(slit: &Slit, sums: Sums, border: &[FaceId], placement: &Placement) -> Self {
-        let border = border.iter().map(|&f| placement.triangle(slit, f));
-        let border: Vec<Triangle> = border.collect();
-        let rectangle = smallest(&border);
-        let sides = [rectangle.width, rectangle.width * rectangle.height];
-        Self {
-            demand: Demand { sums, sides },
-            angle: wrap_angle(rectangle.angle),
-            border,
-        }
-    }
 }
 
 /// Greatest log scale of some faces.

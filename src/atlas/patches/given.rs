@@ -7,7 +7,7 @@
 //! it is what was given.
 
 use super::demand::Sums;
-use super::rectangle::in_rectangle;
+use super::rectangle::{Directions, in_rectangle};
 use super::{PatchError, PatchLayout, PatchParams, seams, with_images};
 use crate::atlas::cut::slit_copies;
 use crate::atlas::plane::doubled_area;
@@ -70,7 +70,7 @@ pub fn charts_of(
             corners.iter_mut().flatten().for_each(|p| p[0] = -p[0]);
             area = -area;
         }
-        let patch = in_rectangle(&corners, area);
+        let patch = in_rectangle(&corners, area, Directions::Any);
         for (&f, &corners) in faces.iter().zip(&patch.uv) {
             face_patch[f] = PatchId::new(i);
             placed[f] = corners;

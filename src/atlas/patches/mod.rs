@@ -22,10 +22,12 @@ mod dissolve;
 mod divide;
 mod given;
 mod holes;
+mod lattice;
 mod merge;
 mod overlap;
 mod packing;
 mod placement;
+mod places;
 pub(crate) mod raster;
 mod rectangle;
 mod resolution;
@@ -52,8 +54,10 @@ pub(crate) use bend::edge_bends;
 use demand::Sums;
 use divide::Divider;
 pub use given::charts_of;
+pub(crate) use places::packed;
+use places::{Placed, images, with_images};
 use rayon::prelude::*;
-use rectangle::Oriented;
+use rectangle::{Directions, Oriented};
 use resolution::Raster;
 pub(crate) use seams::seams;
 use slit::Slit;
@@ -191,6 +195,9 @@ pub struct PatchParams {
     pub max_count: Option<usize>,
     /// Columns and rows of one image of all flat patches. Patches get fewer texels than the budget has where they would not fit.
     pub packed_side: Option<usize>,
+    /// Texels of all flat patches on one lattice of the central chart: square, parallel to its axes, each size a power of two times the others. Off: texels of each patch as
+    /// long and as wide as suits it.
+    pub shared_lattice: bool,
 }
 
 impl Default for PatchParams {
@@ -202,6 +209,7 @@ impl Default for PatchParams {
             padding: 2,
             max_count: None,
             packed_side: None,
+            shared_lattice: false,
         }
     }
 }
@@ -234,6 +242,15 @@ pub enum PatchError {
 }
 
 impl PatchParams {
+    /// The directions that rectangles around patches may have.
+    fn directions(&self) -> Directions {
+        if self.shared_lattice {
+            Directions::Axes
+        } else {
+            Directions::Any
+        }
+    }
+
     /// Refuses values that no layout can have.
     pub fn validate(&self) -> Result<(), PatchError> {
         let bounds = [
@@ -308,7 +325,7 @@ pub fn layout(
     }
     let orient = |own: &mut Vec<[f64; 2]>, (i, faces): (usize, &Vec<FaceId>)| {
         let member = |f: FaceId| face_patch[f].index() == i;
-        rectangle::orient(&slit, faces, member, own)
+        rectangle::orient(&slit, faces, member, params.directions(), own)
     };
     let rows = sets.par_iter().enumerate();
     let oriented = rows.map_init(|| vec![[0.0; 2]; development.copies], orient);
@@ -327,9 +344,9 @@ pub fn layout(
         seams,
         packed: None,
     };
-    // Rectangles have rasters of their own, and the one image of all has square texels.
+    // Rectangles have rasters of their own, and the one image of all has square texels, as has a lattice.
     (layout.patches, layout.packed) = match domain {
-        Domain::Flat if params.packed_side.is_none() => {
+        Domain::Flat if params.packed_side.is_none() && !params.shared_lattice => {
             let rasters = rasters_by_bend(mesh, &layout, &oriented, &sums, params);
             images(&oriented, Placed::of(&oriented, rasters, params), params)
         }
@@ -366,58 +383,6 @@ fn rasters_by_bend(
     resolution::adapted(oriented, &even, &bends, params)
 }
 
-/// Gives patches images of square texels and their places in the packed square.
-fn with_images(
-    oriented: &[Oriented],
-    sums: &[Sums],
-    params: &PatchParams,
-) -> (Vec<Patch>, Option<PackedPlaces>) {
-    images(oriented, place(oriented, sums, params), params)
-}
-
-/// The patches with their images, and the places of these in the packed square.
-fn images(
-    oriented: &[Oriented],
-    placed: Placed,
-    params: &PatchParams,
-) -> (Vec<Patch>, Option<PackedPlaces>) {
-    let Placed {
-        rasters,
-        sizes,
-        corners,
-        side,
-    } = placed;
-    let contents: Vec<[f64; 2]> = oriented
-        .iter()
-        .zip(&rasters)
-        .map(|(patch, raster)| square_content(patch, raster, params))
-        .collect();
-    let patches = oriented
-        .iter()
-        .zip(&rasters)
-        .zip(in_square(&sizes, &contents, &corners, side))
-        .map(|((patch, raster), (packed_scale, packed_offset))| Patch {
-            to_chart: Some(patch.to_chart),
-            width: raster.width,
-            height: raster.height,
-            texel_to_patch: raster.texel_to_patch,
-            packed_scale,
-            packed_offset,
-        })
-        .collect();
-    let packed = params.packed_side.map(|_| PackedPlaces {
-        side,
-        corners: (rasters.iter().zip(&sizes).zip(&corners))
-            .map(|((raster, size), corner)| {
-                // In the middle of its box, which is higher only where rows are not as far apart as columns.
-                let above = (size[1] - raster.height.min(size[1])) / 2;
-                [corner[0], side - corner[1] - size[1] + above]
-            })
-            .collect(),
-    });
-    (patches, packed)
-}
-
 /// The patches' faces: at most `max_count`, as far as the range of scale decides about that; and that range.
 fn segment_into(slit: &Slit, domain: Domain, params: &PatchParams) -> (Vec<Vec<FaceId>>, f64) {
     let mut range = params.log_scale_range;
@@ -430,110 +395,4 @@ fn segment_into(slit: &Slit, domain: Domain, params: &PatchParams) -> (Vec<Vec<F
         }
     }
     (sets, range)
-}
-
-/// Rasters with their boxes in the packed square, and its side, in texels; corners count from the lower left.
-struct Placed {
-    rasters: Vec<Raster>,
-    sizes: Vec<[usize; 2]>,
-    corners: Vec<[usize; 2]>,
-    side: usize,
-}
-
-impl Placed {
-    fn of(patches: &[Oriented], rasters: Vec<Raster>, params: &PatchParams) -> Self {
-        let sizes: Vec<[usize; 2]> = patches
-            .iter()
-            .zip(&rasters)
-            .map(|(patch, raster)| {
-                let [width, height] = square_content(patch, raster, params);
-                let sized = |n: f64, margin: f64| {
-                    ((n - 1e-6).ceil().max(1.0) + 2.0 * margin).round() as usize
-                };
-                match params.packed_side {
-                    // The image itself must find room.
-                    Some(_) => [
-                        raster.width,
-                        sized(height, raster.margin).max(raster.height),
-                    ],
-                    None => [width, height].map(|n| sized(n, raster.margin.max(0.5))),
-                }
-            })
-            .collect();
-        let fitting = params.packed_side.and_then(|side| {
-            let corners = packing::pack_into(&sizes, side)?;
-            Some((corners, side))
-        });
-        let (corners, side) = fitting.unwrap_or_else(|| packing::pack(&sizes));
-        Self {
-            rasters,
-            sizes,
-            corners,
-            side,
-        }
-    }
-}
-
-/// Columns and rows of a patch in the packed square, where texels are square: about as many as its image has.
-fn square_content(patch: &Oriented, raster: &Raster, params: &PatchParams) -> [f64; 2] {
-    let [columns, rows] = raster.density;
-    let density = match params.packed_side {
-        // That of the image, texel for texel.
-        Some(_) => columns,
-        None => (columns * rows).sqrt().min(4.0 * columns),
-    };
-    [density, density * patch.height]
-}
-
-/// Gives the patches as many texels as the budget has, or, where a side is asked for, as fit; the least that patches must have may be more.
-fn place(patches: &[Oriented], sums: &[Sums], params: &PatchParams) -> Placed {
-    let with = |texel_budget: usize| {
-        let params = PatchParams {
-            texel_budget,
-            ..params.clone()
-        };
-        let rasters = resolution::rasters(patches, sums, &params);
-        Placed::of(patches, rasters, &params)
-    };
-    let whole = with(params.texel_budget);
-    let Some(most) = params.packed_side.filter(|&most| whole.side > most) else {
-        return whole;
-    };
-    let (mut low, mut high) = (1, params.texel_budget);
-    let mut best = with(low);
-    // Within a thousandth of the greatest budget that fits.
-    while best.side <= most && high - low > 1 + low / 1024 {
-        let middle = low + (high - low) / 2;
-        let tried = with(middle);
-        if tried.side <= most {
-            (low, best) = (middle, tried);
-        } else {
-            high = middle;
-        }
-    }
-    best
-}
-
-/// Places contents (width, height) in the middle of their boxes, packed into a square: the part of the square that a unit of the
-/// content's width is, and where its lower left corner lies in the unit square.
-pub(crate) fn packed(sizes: &[[usize; 2]], contents: &[[f64; 2]]) -> Vec<(f64, [f64; 2])> {
-    let (corners, side) = packing::pack(sizes);
-    in_square(sizes, contents, &corners, side)
-}
-
-/// The same for boxes that have their places.
-fn in_square(
-    sizes: &[[usize; 2]],
-    contents: &[[f64; 2]],
-    corners: &[[usize; 2]],
-    side: usize,
-) -> Vec<(f64, [f64; 2])> {
-    let side = side as f64;
-    let boxes = sizes.iter().zip(corners).zip(contents);
-    boxes
-        .map(|((size, corner), content)| {
-            let place = |i: usize| corner[i] as f64 + 0.5 * (size[i] as f64 - content[i]);
-            (content[0] / side, [place(0) / side, place(1) / side])
-        })
-        .collect()
 }

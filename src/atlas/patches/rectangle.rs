@@ -15,6 +15,18 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 /// side, are compared with the patch's own development and give way if that is better.
 const GOOD_LENGTHS: f64 = 1e-11;
 
+/// By this part of itself a side must be longer than another to be the longer one.
+const TIE: f64 = 1e-6;
+
+/// Which directions a rectangle's sides may have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Directions {
+    /// Any: the rectangle is the smallest of all.
+    Any,
+    /// Those of the central chart's axes.
+    Axes,
+}
+
 /// A patch in its own coordinates.
 pub(super) struct Oriented {
     /// Corners of the faces, in the order of the faces given.
@@ -32,6 +44,7 @@ pub(super) fn orient(
     slit: &Slit,
     faces: &[FaceId],
     member: impl Fn(FaceId) -> bool,
+    directions: Directions,
     own: &mut [[f64; 2]],
 ) -> Oriented {
     let highest = faces.iter().map(|&f| slit.log_scale[f]);
@@ -45,23 +58,23 @@ pub(super) fn orient(
         .unwrap_or(FaceId::new(0));
     let placement = place(slit, faces.iter().copied(), root, highest, &member, own);
     let mut frame = Frame::new(slit, faces, &placement, slit.is_deep(highest));
-    if !frame.own {
+    if frame.own {
+        if directions == Directions::Axes {
+            frame.turn_like_chart(slit, faces);
+        }
+    } else {
         let error = slit.length_error(faces, placement.positions);
         if error > GOOD_LENGTHS {
             slit.develop(root, member, own);
             if slit.length_error(faces, own) < 0.1 * error {
                 let placement = Placement::new(slit, own, faces.iter().copied());
                 frame = Frame::new(slit, faces, &placement, true);
-                // Turned like the central chart, so that both ways give one orientation.
-                let turn = fit(slit, faces, &frame.corners, 1.0).rotation;
-                let turned = rotation(turn);
-                for p in frame.corners.iter_mut().flatten() {
-                    *p = turned(*p);
-                }
+                // Both ways give one orientation.
+                frame.turn_like_chart(slit, faces);
             }
         }
     }
-    frame.orient(slit, faces)
+    frame.orient(slit, faces, directions)
 }
 
 struct Frame {
@@ -75,24 +88,41 @@ impl Frame {
         Frame { corners, own }
     }
 
-    fn orient(self, slit: &Slit, faces: &[FaceId]) -> Oriented {
+    /// Turns own coordinates so that their axes are those of the central chart.
+    fn turn_like_chart(&mut self, slit: &Slit, faces: &[FaceId]) {
+        let turned = rotation(fit(slit, faces, &self.corners, 1.0, None).rotation);
+        for p in self.corners.iter_mut().flatten() {
+            *p = turned(*p);
+        }
+    }
+
+    fn orient(self, slit: &Slit, faces: &[FaceId], directions: Directions) -> Oriented {
         let flat: f64 = faces.iter().map(|&f| slit.flat_area[f]).sum();
-        let mut oriented = in_rectangle(&self.corners, flat);
+        let mut oriented = in_rectangle(&self.corners, flat, directions);
         if self.own {
-            oriented.to_chart = fit(slit, faces, &oriented.uv, oriented.to_chart.scale);
+            let Similarity {
+                scale, rotation, ..
+            } = oriented.to_chart;
+            // Along the axes it is known, and exact.
+            let known = (directions == Directions::Axes).then_some(rotation);
+            oriented.to_chart = fit(slit, faces, &oriented.uv, scale, known);
         }
         oriented
     }
 }
 
 /// Triangles of a given total area in the coordinates of their smallest rectangle; `to_chart` leads back.
-pub(super) fn in_rectangle(corners: &[[[f64; 2]; 3]], area: f64) -> Oriented {
+pub(super) fn in_rectangle(
+    corners: &[[[f64; 2]; 3]],
+    area: f64,
+    directions: Directions,
+) -> Oriented {
     let Smallest {
         angle,
         low,
         width,
         height,
-    } = smallest(corners);
+    } = smallest(corners, directions);
     let turned = rotation(-angle);
     let to_patch = |p: [f64; 2]| {
         let q = turned(p);
@@ -123,9 +153,16 @@ pub(super) struct Smallest {
 }
 
 /// The smallest rectangle around triangles. Those on a patch's border have the same as all.
-pub(super) fn smallest(corners: &[[[f64; 2]; 3]]) -> Smallest {
+pub(super) fn smallest(corners: &[[[f64; 2]; 3]], directions: Directions) -> Smallest {
     let points = || corners.iter().flatten().copied();
-    let angle = best_angle(&convex_hull(outer(points)));
+    let angle = match directions {
+        Directions::Any => best_angle(&convex_hull(outer(points))),
+        Directions::Axes => {
+            let (low, high) = extents(points());
+            let is_higher = high[1] - low[1] > (high[0] - low[0]) * (1.0 + TIE);
+            if is_higher { FRAC_PI_2 } else { 0.0 }
+        }
+    };
     let (low, high) = extents(points().map(rotation(-angle)));
     let width = high[0] - low[0];
     // A patch without any extent keeps its coordinates.
@@ -138,9 +175,15 @@ pub(super) fn smallest(corners: &[[[f64; 2]; 3]]) -> Smallest {
     }
 }
 
-/// The similarity of known scale that takes patch coordinates nearest to the central ones. Where a
+/// The similarity of known scale that takes patch coordinates nearest to the central ones, of known rotation where one is given. Where a
 /// patch is smaller than the central chart resolves, its rotation means nothing and its translation is right.
-fn fit(slit: &Slit, faces: &[FaceId], uv: &[[[f64; 2]; 3]], scale: f64) -> Similarity {
+fn fit(
+    slit: &Slit,
+    faces: &[FaceId],
+    uv: &[[[f64; 2]; 3]],
+    scale: f64,
+    known: Option<f64>,
+) -> Similarity {
     let central = |f: FaceId, k: usize| slit.development.uv[f][k];
     let pairs = || {
         let rows = faces.iter().zip(uv);
@@ -163,10 +206,10 @@ fn fit(slit: &Slit, faces: &[FaceId], uv: &[[[f64; 2]; 3]], scale: f64) -> Simil
         dot += p[0] * q[0] + p[1] * q[1];
         cross += p[0] * q[1] - p[1] * q[0];
     }
-    let rotation = if dot == 0.0 && cross == 0.0 {
-        0.0
-    } else {
-        wrap_angle(cross.atan2(dot))
+    let rotation = match known {
+        Some(rotation) => rotation,
+        None if dot == 0.0 && cross == 0.0 => 0.0,
+        None => wrap_angle(cross.atan2(dot)),
     };
     let turned = rotate(from, rotation);
     Similarity {
@@ -270,7 +313,7 @@ fn best_angle(hull: &[[f64; 2]]) -> f64 {
         let (low, high) = extents(hull.iter().copied().map(rotation(-angle)));
         let (w, h) = (high[0] - low[0], high[1] - low[1]);
         let area = w * h / (perimeter * perimeter).max(f64::MIN_POSITIVE);
-        let angle = if h > w * (1.0 + 1e-6) {
+        let angle = if h > w * (1.0 + TIE) {
             angle + FRAC_PI_2
         } else {
             angle

@@ -32,22 +32,16 @@ pub(super) struct Raster {
     pub density: [f64; 2],
     /// Columns and rows between the image's border and the patch's rectangle, at least.
     pub margin: f64,
+    /// Columns left of the rectangle, and rows below it.
+    pub low: [f64; 2],
 }
 
 /// Rasters of all patches; `sums` are their areas and bends.
 pub(super) fn rasters(patches: &[Oriented], sums: &[Sums], params: &PatchParams) -> Vec<Raster> {
     let margin = params.padding as f64;
     let most = densest(params);
-    let demand = |(patch, sums): (&Oriented, &Sums)| {
-        let width = patch.to_chart.scale;
-        let sides = [width, width * patch.height];
-        Demand { sums: *sums, sides }
-    };
-    let demands: Vec<Demand> = patches.iter().zip(sums).map(demand).collect();
-    let coarsest: Vec<f64> = patches
-        .iter()
-        .map(|p| p.to_chart.scale / least_density(p.height, p.area, params))
-        .collect();
+    let demands = demands(patches, sums);
+    let coarsest = coarsest_of(patches, params);
     let budget = demand::budget(&demands, &coarsest, params);
     let least = least_covered(params);
     let texels = demands.iter().zip(&coarsest);
@@ -70,6 +64,24 @@ pub(super) fn rasters(patches: &[Oriented], sums: &[Sums], params: &PatchParams)
                 columns = (2.0 * columns).min(most);
             }
         })
+        .collect()
+}
+
+/// What patches ask for; `sums` are their areas and bends.
+pub(super) fn demands(patches: &[Oriented], sums: &[Sums]) -> Vec<Demand> {
+    let demand = |(patch, sums): (&Oriented, &Sums)| {
+        let width = patch.to_chart.scale;
+        let sides = [width, width * patch.height];
+        Demand { sums: *sums, sides }
+    };
+    patches.iter().zip(sums).map(demand).collect()
+}
+
+/// The widest texels that the images of patches may have.
+pub(super) fn coarsest_of(patches: &[Oriented], params: &PatchParams) -> Vec<f64> {
+    patches
+        .iter()
+        .map(|p| p.to_chart.scale / least_density(p.height, p.area, params))
         .collect()
 }
 
@@ -128,7 +140,7 @@ impl Raster {
 }
 
 /// Most texels on the longer side of a patch.
-fn densest(params: &PatchParams) -> f64 {
+pub(super) fn densest(params: &PatchParams) -> f64 {
     (MAX_SIDE - 2 * params.padding.max(1)) as f64
 }
 
@@ -138,7 +150,7 @@ fn least_short(params: &PatchParams) -> f64 {
 }
 
 /// Least texel centres inside a patch.
-fn least_covered(params: &PatchParams) -> usize {
+pub(super) fn least_covered(params: &PatchParams) -> usize {
     (MIN_COVERED * least_short(params).powi(2)).ceil() as usize
 }
 
@@ -173,7 +185,7 @@ fn isotropic(height: f64, columns: f64, margin: f64) -> Raster {
 }
 
 /// Last resort for patches thousands of times longer than wide: rows closer together than columns.
-fn stretched(height: f64, columns: f64, margin: f64) -> Raster {
+pub(super) fn stretched(height: f64, columns: f64, margin: f64) -> Raster {
     let rows = 2.0 * MIN_SHORT_SIDE;
     let density = rows / height.max(1e-12);
     raster(height, columns, [columns, density], rows, margin)
@@ -192,11 +204,12 @@ fn raster(height: f64, columns: f64, density: [f64; 2], rows: f64, margin: f64) 
         ],
         density,
         margin,
+        low: [left, bottom],
     }
 }
 
 /// Number of texel centres inside the patch, up to a little more than what is asked for.
-fn covered(patch: &Oriented, raster: &Raster, least: usize) -> usize {
+pub(super) fn covered(patch: &Oriented, raster: &Raster, least: usize) -> usize {
     let mut seen = std::collections::BTreeSet::new();
     for t in &patch.uv {
         let t = t.map(|p| to_texel(&raster.texel_to_patch, p));

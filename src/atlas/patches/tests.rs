@@ -480,6 +480,38 @@ fn padding_and_budget_are_kept() {
     }
 }
 
+#[test]
+fn everything_holds_on_a_lattice_too() {
+    for padding in [0, 2] {
+        let params = PatchParams {
+            shared_lattice: true,
+            padding,
+            ..params()
+        };
+        check(&square(6), &params);
+        check(&helix(2.5), &params);
+        let checked = check(&ramp(60, 6, 6.0), &params);
+        // Corners of texels are whole numbers of the finest ones.
+        let patches = &checked.layout.patches;
+        let to_chart = |p: &Patch, x: f64, y: f64| {
+            let q = p.texel_to_patch.map(|[a, b, c]| a * x + b * y + c);
+            p.to_chart.unwrap().apply(q)
+        };
+        let width = |p: &Patch| distance(to_chart(p, 0.0, 0.0), to_chart(p, 1.0, 0.0));
+        let finest = patches.iter().map(width).fold(f64::INFINITY, f64::min);
+        assert!(patches.iter().any(|p| width(p) > 1.5 * finest));
+        for p in patches {
+            let corner = to_chart(p, 0.0, 0.0).map(|q| q / width(p));
+            let levels = (width(p) / finest).log2();
+            let numbers = [corner[0], corner[1], levels];
+            assert!(
+                numbers.iter().all(|n| (n - n.round()).abs() < 1e-6),
+                "{numbers:?}"
+            );
+        }
+    }
+}
+
 /// The same sample in other units, with other last digits.
 fn perturbed(mut s: Sample, scale: f64) -> Sample {
     let mut state = 99u64;

@@ -124,16 +124,17 @@ fn channels_are_a_set_of_known_words() {
 }
 
 #[test]
-fn packed_rectangles_are_refused_wherever_the_keys_stand() {
+fn keys_of_flat_images_are_refused_for_rectangles_wherever_the_keys_stand() {
     let packed = "[patches]\npacked_side = 512";
     assert!(parse("f", packed, &[]).is_ok());
     for (text, set) in [
         (packed, "images.domain=rectangle"),
+        ("patches.shared_lattice = true", "preset=spline-fit"),
         (packed, "preset=spline-fit"),
         ("preset = \"omage-1024\"", "images.domain=rectangle"),
     ] {
         let error = parse("f", text, &[set.to_owned()]).expect_err(text);
-        assert_eq!(error, ConfigError::PackedRectangles);
+        assert!(matches!(error, ConfigError::OnlyFlat { .. }), "{error}");
     }
     // The preset's domain lies below the user's own.
     let set = [

@@ -4,7 +4,7 @@
 
 use super::super::merge::{Part, joins_to_a_disk, overlaps, within};
 use super::super::placement::place;
-use super::{Divider, Outline, Scratch};
+use super::{Divider, Scratch};
 use crate::atlas::patches::demand::Sums;
 use crate::geometry::ids::{FaceId, FaceVec};
 use std::cmp::Reverse;
@@ -71,7 +71,7 @@ impl Divider<'_> {
         let Scratch { sets, own, .. } = scratch;
         let (sums, border) = self.sums_and_border(&part.faces, sets);
         let placement = self.placed(&part.faces, &border, sets, own);
-        let outline = Outline::new(self.slit, sums, &border, &placement);
+        let outline = self.outline(sums, &border, &placement);
         Piece {
             cost: self.cost(&outline.demand),
             part,
@@ -116,7 +116,7 @@ impl Divider<'_> {
         let highest = a.part.log_scale[1].max(b.part.log_scale[1]);
         let member = |f: FaceId| pair.contains(&label[f]);
         let placement = place(slit, border.iter().copied(), root, highest, member, own);
-        let outline = Outline::new(slit, sums, &border, &placement);
+        let outline = self.outline(sums, &border, &placement);
         a.cost + b.cost - self.cost(&outline.demand)
     }
 }
