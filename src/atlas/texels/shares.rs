@@ -173,7 +173,8 @@ fn stationary(fourth: f64, second: f64, cost: f64) -> f64 {
         let cube = k * k * k;
         let slope = 5.0 * cost * cube * k - 2.0 * second * k;
         let step = (cost * cube * k * k - second * k * k - fourth) / slope;
-        if !(step > PRECISE * k) {
+        // Not a number where nothing is gained: k is 0 then.
+        if step.is_nan() || step <= PRECISE * k {
             break;
         }
         k -= step;
