@@ -61,6 +61,7 @@ use rectangle::{Directions, Oriented};
 use resolution::Raster;
 pub(crate) use seams::seams;
 use slit::Slit;
+pub(super) use slit::apex;
 #[cfg(test)]
 pub(crate) use slit::own_development_error;
 

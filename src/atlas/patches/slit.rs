@@ -312,20 +312,24 @@ impl Disk<'_> {
     fn apex(&self, h: HalfedgeId, a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
         let c = self.connectivity;
         let side = |h: HalfedgeId| self.length[c.edge(h)];
-        let (l_ab, l_bc, l_ca) = (side(h), side(c.next(h)), side(c.prev(h)));
-        let along = 0.5 * (l_ab + (l_ca - l_bc) * (l_ca + l_bc) / l_ab);
-        let height = 2.0 * flat_area([l_ab, l_bc, l_ca]) / l_ab;
-        let d = plane::distance(a, b);
-        let unit = if d > 0.0 {
-            [(b[0] - a[0]) / d, (b[1] - a[1]) / d]
-        } else {
-            [1.0, 0.0]
-        };
-        [
-            a[0] + along * unit[0] - height * unit[1],
-            a[1] + along * unit[1] + height * unit[0],
-        ]
+        apex(a, b, [side(h), side(c.next(h)), side(c.prev(h))])
     }
+}
+
+/// The third corner of a triangle, left of `a` and `b`, from the lengths ab, bc and ca.
+pub(in crate::atlas) fn apex(a: [f64; 2], b: [f64; 2], [l_ab, l_bc, l_ca]: [f64; 3]) -> [f64; 2] {
+    let along = 0.5 * (l_ab + (l_ca - l_bc) * (l_ca + l_bc) / l_ab);
+    let height = 2.0 * flat_area([l_ab, l_bc, l_ca]) / l_ab;
+    let d = plane::distance(a, b);
+    let unit = if d > 0.0 {
+        [(b[0] - a[0]) / d, (b[1] - a[1]) / d]
+    } else {
+        [1.0, 0.0]
+    };
+    [
+        a[0] + along * unit[0] - height * unit[1],
+        a[1] + along * unit[1] + height * unit[0],
+    ]
 }
 
 /// Area of a triangle from its sides, in any order, accurate for slivers (Kahan's arrangement of

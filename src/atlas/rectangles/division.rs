@@ -332,7 +332,7 @@ fn anchors(nodes: &[usize], along: &[f64], spacing: f64) -> Vec<Anchor> {
 }
 
 /// The angle in space at a place of the border, radians.
-fn angle(disk: &Disk, length: &EdgeVec<f64>, place: usize) -> f64 {
+pub(super) fn angle(disk: &Disk, length: &EdgeVec<f64>, place: usize) -> f64 {
     let c = &disk.connectivity;
     let corner = |h: HalfedgeId| {
         let angles = angles(c.face_edges(c.face(h)).map(|e| length[e]));

@@ -7,6 +7,7 @@
 //! Every prescription of this kind is met (Gauss, Bonnet: 4 · π/2 = 2π χ), whatever the mesh: see [`ricci`].
 
 use super::RectangleError;
+use super::diagonals;
 use super::quads::Quad;
 use super::subdivision::{Corner, Subdivision};
 use crate::atlas::overlay::{self, Carrier, Layout, OnBase, Overlay};
@@ -158,6 +159,14 @@ pub(super) fn flatten(
     let carrier = fine
         .vertices()
         .map(|v| layout.carrier(fine.vertex_halfedge(v)));
+    let mut carrier = carrier.collect();
+    let mut fine = Subdivision {
+        corner,
+        parent: parent.collect(),
+        position: mesh.positions,
+        connectivity: mesh.connectivity,
+    };
+    diagonals::draw(&mut fine, &layout, &mut carrier);
     Ok(Rectangle {
         known: disk.vertex.clone(),
         border: pieces,
@@ -165,15 +174,10 @@ pub(super) fn flatten(
         height: shape.height,
         origin: shape.origin,
         unequal: shape.unequal,
-        carrier: carrier.collect(),
+        carrier,
         density: VertexVec::filled(1.0, layout.connectivity.vertex_count()),
         layout,
-        fine: Subdivision {
-            corner,
-            parent: parent.collect(),
-            position: mesh.positions,
-            connectivity: mesh.connectivity,
-        },
+        fine,
     })
 }
 

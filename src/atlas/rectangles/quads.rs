@@ -17,7 +17,8 @@ use super::chord::{Crossing, aim, zero_level};
 use super::disk::Disk;
 use super::division::{cross, draw, joining, part, places, regions};
 use super::sides::{Drawing, Role};
-use crate::geometry::ids::{FaceId, VertexId, VertexVec};
+use super::subdivision::Subdivision;
+use crate::geometry::ids::{EdgeId, FaceId, VertexId, VertexVec};
 
 /// A four-sided part of a patch.
 pub(super) struct Quad {
@@ -25,6 +26,19 @@ pub(super) struct Quad {
     pub disk: Disk,
     /// Places of its corners on the disk's border, in the order of the border.
     pub corners: [usize; 4],
+}
+
+impl Quad {
+    /// The edges of the drawing on a side, from corner `k` on.
+    pub fn side(&self, drawing: &Subdivision, k: usize) -> Vec<EdgeId> {
+        let n = self.disk.border.len();
+        let (from, to) = (self.corners[k % 4], self.corners[(k + 1) % 4]);
+        let count = (to + n - from) % n;
+        let place = |i| self.disk.border[(from + i) % n];
+        (0..count)
+            .map(|i| self.disk.edge(drawing, place(i)))
+            .collect()
+    }
 }
 
 /// Divides all regions between walls; walls are drawn between quads. In the order of their first faces.
@@ -41,6 +55,11 @@ pub(super) fn quads(drawing: &mut Drawing) -> Result<Vec<Quad>, RectangleError> 
         star(drawing, disk, &middles, &nodes)?;
     }
     // Splits may have moved halfedges of parts that were finished: taken out at the end.
+    regions_as_quads(drawing)
+}
+
+/// All regions between walls, which must have four corners.
+pub(super) fn regions_as_quads(drawing: &Drawing) -> Result<Vec<Quad>, RectangleError> {
     let quad = |start| {
         let disk = part(drawing, start)?;
         let corners: Vec<usize> = places(drawing, &disk, |role| role != Role::Plain).collect();

@@ -43,7 +43,7 @@ pub(super) fn relax(drawing: &mut Drawing) -> Result<(), RectangleError> {
 }
 
 /// Whether a wall that stays ends at a node.
-fn is_pinned(drawing: &Drawing, node: VertexId) -> bool {
+pub(super) fn is_pinned(drawing: &Drawing, node: VertexId) -> bool {
     let c = &drawing.fine.connectivity;
     c.is_boundary_vertex(node)
         || c.outgoing(node)

@@ -261,7 +261,7 @@ impl Drawing {
     }
 
     /// Gives a role to the place at a distance along a chain; not to its ends.
-    fn mark(&mut self, chain: &mut Chain, distance: f64, role: Role) {
+    pub(super) fn mark(&mut self, chain: &mut Chain, distance: f64, role: Role) {
         let mut before = 0.0;
         let last = chain.edges.len().saturating_sub(1);
         for (i, &e) in chain.edges.iter().enumerate() {

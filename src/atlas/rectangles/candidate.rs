@@ -1,0 +1,199 @@
+//! A surface in rectangles, one of several ways to divide it.
+//!
+//! *Enters:* a surface with its charts. *Leaves:* a [`Candidate`]: the surface on finer faces, the rectangles and their images' sizes, and what error the images will have.
+//!
+//! Either the surface is divided into clusters, whatever the flat patches and the cut are ([`in_clusters`]), or the flat patches are ([`in_patches`]): that asks nothing of the surface and
+//! makes three times as many rectangles, of which each is worse.
+
+use super::flow::Rectangle;
+use super::glue::Added;
+use super::quads::Quad;
+use super::sides::Drawing;
+use super::subdivision::Subdivision;
+use super::counts::Strips;
+use super::{Charted, RectangleError, clusters, contract, density, division, flow, glue, lift, parity, place, quadrangulate, quads, relax, sizes, walls};
+use crate::atlas::geometry_image::{image_origin, sample};
+use crate::atlas::patches::{Patch, PatchLayout, PatchParams, packed, seams};
+use crate::atlas::texels::{Bend, FINER};
+use crate::geometry::ids::{EdgeVec, FaceVec, PatchId};
+use rayon::prelude::*;
+
+/// A surface in rectangles.
+pub(super) struct Candidate {
+    pub surface: Charted,
+    pub layout: PatchLayout,
+    /// The squared error that its images will have, integrated over the surface.
+    pub error: f64,
+    /// Of all rectangles.
+    pub least_height: f64,
+    /// Of opposite sides.
+    pub greatest_difference: f64,
+}
+
+/// About so many clusters of faces, divided into quads by lines between their corners.
+pub(super) fn in_clusters(
+    surface: &Charted,
+    params: &PatchParams,
+    curvature_tolerance: f64,
+    count: usize,
+) -> Result<Candidate, RectangleError> {
+    let clusters = clusters::clusters(&surface.mesh, count);
+    let nothing = EdgeVec::filled(false, surface.mesh.connectivity.edge_count());
+    let mut drawing = Drawing::new(&surface.mesh, &nothing, &clusters)?;
+    contract::contract(&mut drawing)?;
+    relax::relax(&mut drawing)?;
+    parity::make_even(&mut drawing)?;
+    quadrangulate::quadrangulate(&mut drawing)?;
+    relax::relax(&mut drawing)?;
+    let quads = quads::regions_as_quads(&drawing)?;
+    finished(surface, &drawing, &quads, params, curvature_tolerance)
+}
+
+/// Flat patches, with walls drawn anew, divided by demand, and a centre in each joined to the middles of its sides.
+pub(super) fn in_patches(
+    surface: &Charted,
+    flat: &PatchLayout,
+    params: &PatchParams,
+    curvature_tolerance: f64,
+) -> Result<Candidate, RectangleError> {
+    let mut drawing = Drawing::new(&surface.mesh, &surface.cut.is_cut, &flat.face_patch)?;
+    contract::contract(&mut drawing)?;
+    relax::relax(&mut drawing)?;
+    division::divide(&mut drawing)?;
+    sizes::divide(&mut drawing, params.texel_budget)?;
+    contract::contract(&mut drawing)?;
+    relax::relax(&mut drawing)?;
+    // What has moved may be crowded elsewhere.
+    division::divide(&mut drawing)?;
+    drawing.mark_middles();
+    let quads = quads::quads(&mut drawing)?;
+    finished(surface, &drawing, &quads, params, curvature_tolerance)
+}
+
+/// Flattens the quads of a drawing, gives them coordinates and images.
+fn finished(
+    surface: &Charted,
+    drawing: &Drawing,
+    quads: &[Quad],
+    params: &PatchParams,
+    curvature_tolerance: f64,
+) -> Result<Candidate, RectangleError> {
+    let strips = Strips::new(&drawing.fine, quads);
+    let (flattened, added) = placed(&drawing.fine, &drawing.bend, quads, curvature_tolerance)?;
+    let least =
+        |value: fn(&Rectangle) -> f64| flattened.iter().map(value).fold(f64::INFINITY, f64::min);
+    let (fine, face_patch) = glue::glue(&drawing.fine, &flattened, &added)?;
+    let surface = lift::lift(surface.clone(), &fine);
+    let c = &fine.connectivity;
+    let uv: FaceVec<[[f64; 2]; 3]> = c
+        .faces()
+        .map(|f| c.face_halfedges(f).map(|h| fine.corner[h].uv))
+        .collect();
+    let face_patch: FaceVec<PatchId> = face_patch.into();
+    let finer = params.texel_budget.saturating_mul(FINER);
+    let mut layout = PatchLayout {
+        face_patch,
+        uv,
+        patches: patches(&flattened, &strips.even(finer), params),
+        seams: Vec::new(),
+        packed: None,
+    };
+    let bends = bends(&surface, &layout, &flattened);
+    let samples = strips.bent(&bends, params.texel_budget);
+    layout.patches = patches(&flattened, &samples, params);
+    layout.seams = seams(
+        &surface.mesh,
+        &surface.cut.is_cut,
+        &layout.face_patch,
+        &layout.uv,
+    );
+    Ok(Candidate {
+        error: Strips::error(&bends, &samples),
+        least_height: least(|r| r.height),
+        greatest_difference: -least(|r| -r.unequal),
+        surface,
+        layout,
+    })
+}
+
+/// How the surface bends along the sides of every quad, as images of even texels see it.
+fn bends(surface: &Charted, layout: &PatchLayout, rectangles: &[Rectangle]) -> Vec<Bend> {
+    let mesh = &surface.mesh;
+    let images = sample(mesh, layout, &surface.metric.log_scale, image_origin(mesh));
+    let bends = images.iter().map(Bend::of_grid).zip(rectangles);
+    bends
+        .map(|(bend, rectangle)| match rectangle.origin % 2 {
+            0 => bend,
+            _ => bend.turned(),
+        })
+        .collect()
+}
+
+/// Flattens all quads and gives them coordinates, such that both sides of a wall have the same ones along it. `bend` is that of the surface's faces.
+fn placed(
+    drawing: &Subdivision,
+    bend: &FaceVec<f64>,
+    quads: &[Quad],
+    curvature_tolerance: f64,
+) -> Result<(Vec<Rectangle>, Added), RectangleError> {
+    // The error of the first one that has one, whichever is done first.
+    let flattened: Vec<Result<Rectangle, RectangleError>> = quads
+        .par_iter()
+        .enumerate()
+        .map(|(i, quad)| flow::flatten(drawing, quad, i, curvature_tolerance))
+        .collect();
+    let mut rectangles: Vec<Rectangle> = flattened.into_iter().collect::<Result<_, _>>()?;
+    let added = Added::new(drawing, &mut rectangles)?;
+    for rectangle in &mut rectangles {
+        rectangle.density = density::density(rectangle, drawing, bend);
+    }
+    let borders = walls::parameters(drawing, &rectangles)?;
+    let placed: Vec<Result<(), RectangleError>> = rectangles
+        .par_iter_mut()
+        .zip(&borders)
+        .enumerate()
+        .map(|(i, (rectangle, border))| place::place(rectangle, border, i))
+        .collect();
+    placed.into_iter().collect::<Result<(), _>>()?;
+    Ok((rectangles, added))
+}
+
+/// The images: from corner to corner of the rectangles, as many samples as their sides have.
+fn patches(rectangles: &[Rectangle], samples: &[[usize; 2]], params: &PatchParams) -> Vec<Patch> {
+    let images: Vec<([usize; 2], f64)> = rectangles
+        .iter()
+        .zip(samples)
+        .map(|(r, n)| ([n[r.origin % 2], n[(r.origin + 1) % 2]], r.height))
+        .collect();
+    // In the packed square texels are square; as many as the image has.
+    let contents: Vec<[f64; 2]> = images
+        .iter()
+        .map(|&([columns, rows], height)| {
+            let texels = ((columns - 1) * (rows - 1)) as f64;
+            let density = (texels / height).sqrt().min(4.0 * columns as f64);
+            [density, density * height]
+        })
+        .collect();
+    let sizes: Vec<[usize; 2]> = contents
+        .iter()
+        .map(|content| content.map(|x| x.ceil() as usize + 2 * params.padding.max(1)))
+        .collect();
+    let places = packed(&sizes, &contents);
+    images
+        .iter()
+        .zip(places)
+        .map(
+            |(&([width, height], top), (packed_scale, packed_offset))| Patch {
+                to_chart: None,
+                width,
+                height,
+                texel_to_patch: [
+                    [1.0 / (width - 1) as f64, 0.0, 0.0],
+                    [0.0, -top / (height - 1) as f64, top],
+                ],
+                packed_scale,
+                packed_offset,
+            },
+        )
+        .collect()
+}
