@@ -75,7 +75,8 @@ struct Found {
 /// Seams that do not lie on sides, or sides that do not meet whole.
 pub fn neighbours(lattices: &[Lattice], seams: &[Seam]) -> Result<Neighbours, FitError> {
     let mut found = vec![[Found::default(); 4]; lattices.len()];
-    for (id, seam) in seams.iter().enumerate() {
+    let borders = seams.iter().enumerate();
+    for (id, seam) in borders.filter(|(_, seam)| !seam.is_inner()) {
         for pair in seam.samples.windows(2) {
             let left = on_side(
                 lattices,

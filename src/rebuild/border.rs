@@ -88,14 +88,22 @@ fn key((uv, position): ([f64; 2], [f64; 3])) -> Key {
     [u, v, x, y, z].map(bits)
 }
 
-/// Checks the seams and puts their sides in order.
+/// Checks the seams, and leaves those that are borders of patches.
+pub(super) fn checked(seams: &[Seam], frames: &[Frame]) -> Result<Vec<Seam>, RebuildError> {
+    for (id, seam) in seams.iter().enumerate() {
+        check(id, seam, frames)?;
+    }
+    let borders = seams.iter().filter(|seam| !seam.is_inner());
+    Ok(borders.cloned().collect())
+}
+
+/// Puts the sides of checked seams in order.
 pub(super) fn borders(seams: &[Seam], frames: &[Frame]) -> Result<Borders, RebuildError> {
     if frames.is_empty() {
         return Err(RebuildError::NoPatches);
     }
     let mut sides: Vec<Vec<Side>> = vec![Vec::new(); frames.len()];
     for (id, seam) in seams.iter().enumerate() {
-        check(id, seam, frames)?;
         let both = [(Some(seam.left), false), (seam.right, true)];
         for (patch, is_right) in both {
             if let Some(patch) = patch {

@@ -147,8 +147,9 @@ pub fn rebuild(images: &Images<'_>) -> Result<Rebuilt, RebuildError> {
         .enumerate()
         .map(|(id, patch)| Frame::new(id, patch))
         .collect::<Result<Vec<Frame>, _>>()?;
-    let borders = border::borders(images.seams, &frames)?;
-    let chains = thin::thin(images.seams, &frames, &borders)?;
+    let seams = border::checked(images.seams, &frames)?;
+    let borders = border::borders(&seams, &frames)?;
+    let chains = thin::thin(&seams, &frames, &borders)?;
     let bands = images
         .patches
         .par_iter()

@@ -133,7 +133,7 @@ impl Domain {
     }
 }
 
-/// A maximal chain along which two patches meet, or a patch meets itself or the surface's boundary.
+/// A maximal chain along which two patches meet, or a patch meets itself or the surface's boundary; or a part of the cut, wherever it is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Seam {
     /// Patch on the left of the chain.
@@ -142,6 +142,13 @@ pub struct Seam {
     pub right: Option<PatchId>,
     /// Samples in order; the first again at the end of a closed seam.
     pub samples: Vec<SeamSample>,
+}
+
+impl Seam {
+    /// Whether this is a part of the cut inside a patch, which has the same coordinates on both sides: no border. Rectangles may lie across the cut.
+    pub fn is_inner(&self) -> bool {
+        self.right == Some(self.left) && self.samples.iter().all(|s| s.left == s.right)
+    }
 }
 
 /// A point of a seam, the same for both sides.
