@@ -95,7 +95,7 @@ pub(super) fn check(
         empty == 0,
         format!("{empty} empty"),
     );
-    check_inside(surface, arrays, &groups, options, verdicts);
+    check_inside(surface, arrays, document, &groups, options, verdicts);
     let measured: Vec<Measured> = document
         .patches
         .par_iter()
@@ -142,10 +142,11 @@ pub(super) fn check(
     Some(groups)
 }
 
-/// Connected and continuous across edges that are not cut.
+/// Connected and continuous across edges that are not cut; rectangles may lie across the cut, and then have the same coordinates on both sides.
 fn check_inside(
     surface: &Surface<'_>,
     arrays: &Arrays,
+    document: &Document,
     groups: &Groups,
     options: &VerifyOptions,
     verdicts: &mut Verdicts,
@@ -159,18 +160,21 @@ fn check_inside(
     let mut gap = Worst::default();
     for (h, t) in surface.inner_edges() {
         let (f, g) = (h / 3, t / 3);
-        if cut[h] != 0 || arrays.patch[f] != arrays.patch[g] {
+        if arrays.patch[f] != arrays.patch[g] {
+            continue;
+        }
+        let ends = [
+            (surface.tail_corner(h), surface.head_corner(t)),
+            (surface.head_corner(h), surface.tail_corner(t)),
+        ]
+        .map(|(a, b)| [a, b].map(|corner| at_corner(&arrays.patch_uv, corner)));
+        let patch = document.patches.get(arrays.patch[f] as usize);
+        let may_lie_across = patch.is_some_and(|patch| patch.domain == "rectangle");
+        if cut[h] != 0 && !(may_lie_across && ends.iter().all(|[a, b]| a == b)) {
             continue;
         }
         sheets.join(f, g);
-        for (a, b) in [
-            (surface.tail_corner(h), surface.head_corner(t)),
-            (surface.head_corner(h), surface.tail_corner(t)),
-        ] {
-            let (a, b) = (
-                at_corner(&arrays.patch_uv, a),
-                at_corner(&arrays.patch_uv, b),
-            );
+        for [a, b] in ends {
             gap.see(distance2(a, b) / diameter[arrays.patch[f] as usize]);
         }
     }

@@ -44,7 +44,12 @@ pub(super) fn check(
         let [Some(one), Some(other)] = both.map(|p| p.filter(|p| is_rectangle(p))) else {
             continue;
         };
-        for pair in arrays.seam_uv[arrays.seam_range(seam)].windows(2) {
+        let samples = &arrays.seam_uv[arrays.seam_range(seam)];
+        // A part of the cut inside a rectangle.
+        if left == right && samples.iter().all(|[a, b]| a == b) {
+            continue;
+        }
+        for pair in samples.windows(2) {
             let [a, b] = [(one, 0), (other, 1)].map(|(p, k)| side(p, [pair[0][k], pair[1][k]]));
             match a.zip(b) {
                 Some((a, b)) => {

@@ -5,18 +5,25 @@
 //! Either the surface is divided into clusters, whatever the flat patches and the cut are ([`in_clusters`]), or the flat patches are ([`in_patches`]): that asks nothing of the surface and
 //! makes three times as many rectangles, of which each is worse.
 
+use super::counts::Strips;
 use super::flow::Rectangle;
 use super::glue::Added;
 use super::quads::Quad;
 use super::sides::Drawing;
 use super::subdivision::Subdivision;
-use super::counts::Strips;
-use super::{Charted, RectangleError, clusters, contract, density, division, flow, glue, lift, parity, place, quadrangulate, quads, relax, sizes, walls};
-use crate::atlas::geometry_image::{image_origin, sample};
+use super::{
+    Charted, RectangleError, clusters, contract, density, division, flow, glue, lift, parity,
+    place, quadrangulate, quads, relax, sizes, walls,
+};
+use crate::atlas::geometry_image::{GeometryImage, image_origin, sample};
 use crate::atlas::patches::{Patch, PatchLayout, PatchParams, packed, seams};
 use crate::atlas::texels::{Bend, FINER};
 use crate::geometry::ids::{EdgeVec, FaceVec, PatchId};
+use crate::geometry::mesh::{cross, norm, sub};
 use rayon::prelude::*;
+
+/// So many times finer than the images is what their error is measured on.
+const MEASURED: usize = 3;
 
 /// A surface in rectangles.
 pub(super) struct Candidate {
@@ -70,6 +77,41 @@ pub(super) fn in_patches(
     finished(surface, &drawing, &quads, params, curvature_tolerance)
 }
 
+/// The squared distance along the normal, integrated over the surface, between an image and what its every `step`th row and column hold.
+fn missed(image: &GeometryImage, step: usize) -> f64 {
+    let at = |column: usize, row: usize| {
+        let i = image.width * row + column;
+        (
+            image.position[i].map(f64::from),
+            image.normal[i].map(f64::from),
+        )
+    };
+    let mut sum = 0.0;
+    for row in (0..image.height.saturating_sub(1)).step_by(step) {
+        for column in (0..image.width.saturating_sub(1)).step_by(step) {
+            let corner = |i: usize| at(column + step * (i % 2), row + step * (i / 2)).0;
+            let [a, b, c, d] = [0, 1, 2, 3].map(corner);
+            let area = 0.5 * norm(cross(sub(d, a), sub(c, b)));
+            let mut squared = 0.0;
+            for i in 0..step * step {
+                let (s, t) = (i % step, i / step);
+                let (p, normal) = at(column + s, row + t);
+                let (s, t) = (s as f64 / step as f64, t as f64 / step as f64);
+                let above: f64 = (0..3)
+                    .map(|k| {
+                        let top = (1.0 - s) * a[k] + s * b[k];
+                        let bottom = (1.0 - s) * c[k] + s * d[k];
+                        (p[k] - (1.0 - t) * top - t * bottom) * normal[k]
+                    })
+                    .sum();
+                squared += above * above;
+            }
+            sum += area * squared / (step * step) as f64;
+        }
+    }
+    sum
+}
+
 /// Flattens the quads of a drawing, gives them coordinates and images.
 fn finished(
     surface: &Charted,
@@ -100,6 +142,12 @@ fn finished(
     };
     let bends = bends(&surface, &layout, &flattened);
     let samples = strips.bent(&bends, params.texel_budget);
+    // Rows and columns between those of the images tell what these will miss; bends do not, where a map is crowded.
+    let between = samples.iter().map(|n| n.map(|n| MEASURED * (n - 1) + 1));
+    layout.patches = patches(&flattened, &between.collect::<Vec<_>>(), params);
+    let mesh = &surface.mesh;
+    let measured = sample(mesh, &layout, &surface.metric.log_scale, image_origin(mesh));
+    let error = measured.iter().map(|image| missed(image, MEASURED)).sum();
     layout.patches = patches(&flattened, &samples, params);
     layout.seams = seams(
         &surface.mesh,
@@ -108,7 +156,7 @@ fn finished(
         &layout.uv,
     );
     Ok(Candidate {
-        error: Strips::error(&bends, &samples),
+        error,
         least_height: least(|r| r.height),
         greatest_difference: -least(|r| -r.unequal),
         surface,

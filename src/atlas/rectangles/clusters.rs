@@ -79,7 +79,11 @@ pub(super) fn clusters(mesh: &Mesh, count: usize) -> FaceVec<PatchId> {
         let next = number.len();
         PatchId::new(*number.entry(label).or_insert(next))
     };
-    clusters.label.iter().map(|&label| numbered(label)).collect()
+    clusters
+        .label
+        .iter()
+        .map(|&label| numbered(label))
+        .collect()
 }
 
 impl Cluster {
@@ -113,7 +117,13 @@ impl<'a> Clusters<'a> {
             let p = mesh.face_positions(f).map(|p| sub(p, corner));
             let normal = cross(sub(p[1], p[0]), sub(p[2], p[0]));
             let length = norm(normal);
-            let normal = normal.map(|x| if length > 0.0 { radius * x / length } else { 0.0 });
+            let normal = normal.map(|x| {
+                if length > 0.0 {
+                    radius * x / length
+                } else {
+                    0.0
+                }
+            });
             std::array::from_fn(|i| match i {
                 0..3 => (p[0][i] + p[1][i] + p[2][i]) / 3.0,
                 _ => normal[i - 3],
@@ -181,13 +191,15 @@ impl<'a> Clusters<'a> {
     fn seed(&mut self, count: usize) {
         let c = self.c();
         let mut distance = FaceVec::filled(f64::INFINITY, c.face_count());
-        let heaviest = |f: &FaceId, g: &FaceId| self.weight[*f].total_cmp(&self.weight[*g]).then(g.cmp(f));
+        let heaviest =
+            |f: &FaceId, g: &FaceId| self.weight[*f].total_cmp(&self.weight[*g]).then(g.cmp(f));
         let mut start = c.faces().max_by(heaviest);
         let mut made = 0;
         while let Some(f) = start {
             self.grow(f, made, &mut distance, |_| true);
             made += 1;
-            let farthest = |f: &FaceId, g: &FaceId| distance[*f].total_cmp(&distance[*g]).then(g.cmp(f));
+            let farthest =
+                |f: &FaceId, g: &FaceId| distance[*f].total_cmp(&distance[*g]).then(g.cmp(f));
             start = c.faces().max_by(farthest).filter(|&f| {
                 let far = distance[f];
                 far == f64::INFINITY || (far > 0.0 && made < count)
@@ -335,7 +347,8 @@ impl<'a> Clusters<'a> {
                 for h in part.iter().flat_map(|&f| self.c().face_halfedges(f)) {
                     let across = self.c().twin(h).map(|t| self.label[self.c().face(t)]);
                     if let Some(other) = across.filter(|&other| other != own) {
-                        *shared.entry(other).or_default() += self.mesh.edge_length(self.c().edge(h));
+                        *shared.entry(other).or_default() +=
+                            self.mesh.edge_length(self.c().edge(h));
                     }
                 }
                 let most = shared.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
@@ -369,7 +382,9 @@ impl<'a> Clusters<'a> {
             for _ in 0..2 {
                 distance = FaceVec::filled(f64::INFINITY, self.c().face_count());
                 self.grow(from, own, &mut distance, |f| inside.contains(&f));
-                let farthest = |f: &&FaceId, g: &&FaceId| distance[**f].total_cmp(&distance[**g]).then(g.cmp(f));
+                let farthest = |f: &&FaceId, g: &&FaceId| {
+                    distance[**f].total_cmp(&distance[**g]).then(g.cmp(f))
+                };
                 from = part.iter().max_by(farthest).copied().unwrap_or(from);
             }
             let new = self.all.len();

@@ -85,13 +85,6 @@ impl Strips {
         self.samples(&self.shares.bent(bends, even, budget))
     }
 
-    /// The squared error with so many samples, integrated over the surface.
-    pub fn error(bends: &[Bend], samples: &[[usize; 2]]) -> f64 {
-        let rows = bends.iter().zip(samples);
-        rows.map(|(bend, n)| bend.error(n.map(|n| n.saturating_sub(1) as f64)))
-            .sum()
-    }
-
     fn even_intervals(&self, budget: usize) -> Vec<f64> {
         let longest = self.length.iter().fold(f64::MIN_POSITIVE, |m, &x| m.max(x));
         let with = |density: f64| -> Vec<f64> { self.length.iter().map(|l| l * density).collect() };

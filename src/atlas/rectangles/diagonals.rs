@@ -23,11 +23,7 @@ struct Crossing {
 }
 
 /// Draws all of them. `carrier` says where its vertices lie, and gets those of new ones.
-pub(super) fn draw(
-    fine: &mut Subdivision,
-    layout: &Layout,
-    carrier: &mut VertexVec<Carrier>,
-) {
+pub(super) fn draw(fine: &mut Subdivision, layout: &Layout, carrier: &mut VertexVec<Carrier>) {
     let c = &layout.connectivity;
     let diagonals: Vec<EdgeId> = c.edges().filter(|&e| !layout.may_cut[e]).collect();
     // Flat coordinates in every cell that has one.
@@ -134,7 +130,11 @@ fn crossings(
         last = along;
         found.push(Crossing {
             edge,
-            fraction: if c.edge_halfedge(edge) == at { t } else { 1.0 - t },
+            fraction: if c.edge_halfedge(edge) == at {
+                t
+            } else {
+                1.0 - t
+            },
             along,
         });
         let t = c.twin(at).filter(|&t| cell[c.face(t)] == here)?;

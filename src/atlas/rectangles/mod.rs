@@ -167,36 +167,41 @@ pub fn rectangles(
     params: &PatchParams,
     curvature_tolerance: f64,
 ) -> Result<(Charted, PatchLayout), RectangleError> {
-    // Which division is best, only the images tell.
+    // Which division is best, only the images tell. Where clusters make rectangles too crowded for float64, flat patches may be better, since the cut ends at the tips of what stands out.
     let most = (params.texel_budget / LEAST_TEXELS)
         .min(surface.mesh.connectivity.face_count() / LEAST_FACES)
         .max(1);
-    let mut counts = CLUSTERS.map(|count| count * most.min(CLUSTERS[3]) / CLUSTERS[3]).to_vec();
+    let mut counts = CLUSTERS
+        .map(|count| count * most.min(CLUSTERS[3]) / CLUSTERS[3])
+        .to_vec();
     counts.dedup();
-    let in_clusters = counts.par_iter().map(|&count| {
+    let in_clusters = |count| {
         let found = candidate::in_clusters(&surface, params, curvature_tolerance, count);
         if let Err(error) = &found {
-            tracing::debug!(count, %error, "a division into clusters is not used");
+            tracing::debug!(count, %error, "no rectangles of so many clusters");
         }
-        found.ok().map(|found| (count, found))
-    });
-    // The first of those that are equal, whichever is done first.
-    let best = in_clusters.flatten().reduce_with(|a, b| {
-        match b.1.error.total_cmp(&a.1.error).then(b.0.cmp(&a.0)) {
-            std::cmp::Ordering::Less => b,
-            _ => a,
-        }
-    });
-    let found = match best {
-        Some((_, found)) => found,
-        None => candidate::in_patches(&surface, flat, params, curvature_tolerance)?,
+        found.ok()
     };
-    let Candidate { surface, layout, .. } = found;
+    let tried: Vec<Option<Candidate>> = counts.par_iter().map(|&n| in_clusters(n)).collect();
+    let is_hard = tried.iter().any(Option::is_none);
+    let in_patches =
+        is_hard.then(|| candidate::in_patches(&surface, flat, params, curvature_tolerance));
+    let (in_patches, error) = match in_patches {
+        Some(Ok(found)) => (Some(found), None),
+        Some(Err(error)) => (None, Some(error)),
+        None => (None, None),
+    };
+    // The first of those that are equal.
+    let all = tried.into_iter().chain([in_patches]).flatten();
+    let best = all.min_by(|a, b| a.error.total_cmp(&b.error));
+    let found = best.ok_or(error.unwrap_or(RectangleError::Inconsistent {
+        what: "the clusters of faces",
+    }))?;
     tracing::debug!(
-        rectangles = layout.patches.len(),
+        rectangles = found.layout.patches.len(),
         least_height = found.least_height,
         greatest_difference = found.greatest_difference,
         "patches became rectangles"
     );
-    Ok((surface, layout))
+    Ok((found.surface, found.layout))
 }

@@ -237,7 +237,10 @@ mod tests {
                 cost(&graph, &is_halved)
             });
             let least = all.fold(f64::INFINITY, f64::min);
-            assert!(found.is_finite() && found < least + 1e-12, "{odd:?}: {found}, {least}");
+            assert!(
+                found.is_finite() && found < least + 1e-12,
+                "{odd:?}: {found}, {least}"
+            );
         }
         assert!(grid(3, 3, &[4], false).halved().is_err());
     }

@@ -79,11 +79,17 @@ impl Region {
         }
         let corners: Vec<VertexId> = places.iter().map(|&p| disk.border_vertex(p)).collect();
         let edge = |&p: &usize| length.get(&disk.edge(&drawing.fine, disk.border[p]));
-        let sides: Vec<f64> = places.iter().map(|p| edge(p).copied().unwrap_or(0.0)).collect();
+        let sides: Vec<f64> = places
+            .iter()
+            .map(|p| edge(p).copied().unwrap_or(0.0))
+            .collect();
         let span = |a: usize, b: usize| match (b + n - a) % n {
             1 => sides[a],
             d if d == n - 1 => sides[b],
-            _ => distance(drawing.fine.position[corners[a]], drawing.fine.position[corners[b]]),
+            _ => distance(
+                drawing.fine.position[corners[a]],
+                drawing.fine.position[corners[b]],
+            ),
         };
         let unequal = |a: f64, b: f64| {
             let log = (a / b).ln();
@@ -143,7 +149,9 @@ impl Region {
                 Some(_) => before,
                 None => &after,
             };
-            let inside = others.iter().filter(|line| line.iter().all(|k| own.contains(k)));
+            let inside = others
+                .iter()
+                .filter(|line| line.iter().all(|k| own.contains(k)));
             let inside: Vec<Line> = inside.copied().collect();
             self.draw(drawing, disk, own, &inside)?;
         }
@@ -274,7 +282,10 @@ fn quads(corners: Vec<usize>, lines: &[Line]) -> Vec<Vec<usize>> {
             let [i, j] = line.map(|k| part.iter().position(|&x| x == k));
             Some((i?.min(j?), i?.max(j?)))
         };
-        let found = parts.iter().enumerate().find_map(|(k, part)| Some((k, places(part)?)));
+        let found = parts
+            .iter()
+            .enumerate()
+            .find_map(|(k, part)| Some((k, places(part)?)));
         if let Some((k, (i, j))) = found {
             let part = parts.swap_remove(k);
             parts.push(part[i..=j].to_vec());
