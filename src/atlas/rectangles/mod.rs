@@ -4,17 +4,22 @@
 //! rectangles: each is sampled corner to corner, a full grid without a mask.
 //!
 //! ```text
-//! flat patches → sides and nodes → short sides contracted, walls drawn anew, division → small ones joined or not → divided by demand → the same again → middles → quads
+//! clusters of faces → sides and nodes → short sides contracted, walls drawn anew → sides halved until all are even → lines between corners: quads → walls drawn anew
 //! → Ricci flow of each → common parameter of walls → maps spread by stretch and bend → rectangles glued → charts carried over → numbers of samples
 //! ```
 //!
-//! What has n sides becomes n quads (`quads`), so that what decides about the images is where the walls are: short sides go (`contract`), walls meet at even
-//! angles (`relax`), patches with many or hidden corners are divided (`division`), and those that would hold the surface worst for their texels (`sizes`). Small patches are joined (`join`) where the images then turn out better: both are made to the end. Each quad
-//! is flattened by the same flow that made the cone metric, with π/2 at its four corners and nothing else (`flow`); its aspect ratio is its modulus,
+//! What decides about the images is where the walls are. All rectangles have about as many samples, since strips of them wander over the whole surface; so clusters are to be equally hard (`clusters`), and
+//! few, since samples on shared sides lie in two images. A cluster mostly has six sides, and one line makes two quads of it (`parity`, `quadrangulate`); short sides go (`contract`), walls meet at even
+//! angles (`relax`). Several numbers of clusters are tried, and the one whose images miss least is taken (`candidate`). Where some make rectangles too crowded for float64, the flat patches are divided as well: what has n sides
+//! becomes n quads around a centre (`quads`), patches with many or hidden corners are divided first (`division`), and those that would hold the surface worst for their texels (`sizes`).
+//!
+//! Each quad is flattened by the same flow that made the cone metric, with π/2 at its four corners and nothing else (`flow`); its aspect ratio is its modulus,
 //! which cannot be chosen. The two conformal maps on both sides of a wall stretch it differently, and crowd it at corners: its parameter is its length in
 //! space, more where the surface bends (`density`, `walls`), and each quad is mapped to its rectangle with the border so given, harmonically at first and then so that no part is
-//! stretched much more than it is to be (`place`). The final triangulation of a quad is not that of the surface, so the surface is refined once more, and what is linear on its
+//! stretched much more than it is to be (`place`, on faces that lie in those of the flow: `diagonals`). The final triangulation of a quad is not that of the surface, so the surface is refined once more, and what is linear on its
 //! faces is carried over (`lift`). How the images of even texels bend says how many samples every strip of sides gets (`texels`, `counts`).
+//!
+//! Rectangles know nothing of the cut: one may lie across it, with the same coordinates on both sides.
 //!
 //! *Guaranteed:* patches are injective, as harmonic maps to convex shapes are; every side of a rectangle is a whole side of its
 //! neighbour, corner to corner, with as many samples (`counts`), and sample i of n from one corner is the same point for both, to the

@@ -1,7 +1,6 @@
 //! Large patches divided, so that rectangles hold the surface about equally well.
 //!
 //! *Enters:* a [`Drawing`], and a budget of texels. *Leaves:* more walls on it. *Guaranteed:* every part is a disk. *Not guaranteed:* the best of all divisions.
-//! What small patches cost is foreseen here as well, and [`join`](super::join) makes them fewer.
 //!
 //! Strips of rectangles wander over the whole surface, so nearly all rectangles have as many samples: how densely a place is sampled is decided by how large the
 //! rectangles there are. A patch of n sides becomes n of them; with area A its texels are √(A / n) long, in some unit, and its squared error is about b (A / n)^{3/2}, where b is the bend of
@@ -14,12 +13,12 @@ use super::sides::{Drawing, Role};
 use crate::geometry::ids::FaceId;
 use crate::geometry::triangle::area;
 
-/// Decibels that a division must gain, or a join.
-pub(super) const LEAST_GAIN: f64 = 0.03;
+/// Decibels that a division must gain.
+const LEAST_GAIN: f64 = 0.03;
 /// Divisions in one round are those that gain at least this part of what the best one gains: the others are judged again.
 const SHARE: f64 = 0.5;
 /// How often all patches are looked at.
-pub(super) const ROUNDS: usize = 24;
+const ROUNDS: usize = 24;
 /// Quads that a division adds: six, for its line and two sides of neighbours are each counted on both sides, less what becomes of short sides.
 const ADDED: f64 = 4.0;
 /// Where nothing bends, texels are at most about twice as long as the mean: errors are equal where they follow the bend to the power of −1/5.
@@ -29,18 +28,18 @@ const LEAST_FACES: usize = 12;
 
 /// A patch as its rectangles see it.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Size {
-    pub sides: f64,
+struct Size {
+    sides: f64,
     /// Bend, over the patch.
-    pub bend: f64,
-    pub area: f64,
+    bend: f64,
+    area: f64,
     /// Length of its border.
-    pub border: f64,
+    border: f64,
 }
 
 impl Size {
     /// Squared error, if its rectangles had one texel each.
-    pub fn error(&self) -> f64 {
+    fn error(&self) -> f64 {
         self.error_of(self.sides, 1.5)
     }
 
@@ -59,13 +58,13 @@ impl Size {
 
 /// Squared error of all, and their rectangles.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Total {
-    pub error: f64,
-    pub rectangles: f64,
+struct Total {
+    error: f64,
+    rectangles: f64,
 }
 
 impl Total {
-    pub fn of<'a>(sizes: impl Iterator<Item = &'a Size>) -> Self {
+    fn of<'a>(sizes: impl Iterator<Item = &'a Size>) -> Self {
         let zero = Self {
             error: 0.0,
             rectangles: 0.0,
@@ -77,7 +76,7 @@ impl Total {
     }
 
     /// Decibels of the squared error that are gained if this becomes `other`.
-    pub fn gain(&self, other: Self, budget: usize) -> f64 {
+    fn gain(&self, other: Self, budget: usize) -> f64 {
         let before = self.with(budget);
         let gain = 10.0 * (before / other.with(budget)).log10();
         // Rounded: the last digits must not decide.
@@ -134,7 +133,7 @@ pub(super) fn divide(drawing: &mut Drawing, budget: usize) -> Result<(), Rectang
 }
 
 /// The least bend that a place counts as having.
-pub(super) fn floor(drawing: &Drawing) -> f64 {
+fn floor(drawing: &Drawing) -> f64 {
     let (mut bend, mut whole) = (0.0, 0.0);
     for f in drawing.fine.connectivity.faces() {
         let area = face_area(drawing, f);
@@ -154,7 +153,7 @@ fn face_area(drawing: &Drawing, f: FaceId) -> f64 {
     area(lengths).unwrap_or(0.0)
 }
 
-pub(super) fn size(drawing: &Drawing, disk: &Disk, floor: f64) -> Size {
+fn size(drawing: &Drawing, disk: &Disk, floor: f64) -> Size {
     let mut size = Size {
         sides: places(drawing, disk, |role| role == Role::Node).count() as f64,
         ..Size::default()
