@@ -19,7 +19,7 @@ use crate::atlas::geometry_image::{GeometryImage, image_origin, sample};
 use crate::atlas::patches::{Patch, PatchLayout, PatchParams, packed, seams};
 use crate::atlas::texels::{Bend, FINER};
 use crate::geometry::ids::{EdgeVec, FaceVec, PatchId};
-use crate::geometry::mesh::{cross, norm, sub};
+use crate::geometry::mesh::{Mesh, cross, norm, sub};
 use rayon::prelude::*;
 
 /// So many times finer than the images is what their error is measured on.
@@ -44,16 +44,22 @@ pub(super) fn in_clusters(
     curvature_tolerance: f64,
     count: usize,
 ) -> Result<Candidate, RectangleError> {
-    let clusters = clusters::clusters(&surface.mesh, count);
-    let nothing = EdgeVec::filled(false, surface.mesh.connectivity.edge_count());
-    let mut drawing = Drawing::new(&surface.mesh, &nothing, &clusters)?;
+    let drawing = in_cluster_drawing(&surface.mesh, count)?;
+    let quads = quads::regions_as_quads(&drawing)?;
+    finished(surface, &drawing, &quads, params, curvature_tolerance)
+}
+
+/// A surface on which clusters are divided into quads.
+pub(super) fn in_cluster_drawing(mesh: &Mesh, count: usize) -> Result<Drawing, RectangleError> {
+    let clusters = clusters::clusters(mesh, count);
+    let nothing = EdgeVec::filled(false, mesh.connectivity.edge_count());
+    let mut drawing = Drawing::new(mesh, &nothing, &clusters)?;
     contract::contract(&mut drawing)?;
     relax::relax(&mut drawing)?;
     parity::make_even(&mut drawing)?;
     quadrangulate::quadrangulate(&mut drawing)?;
     relax::relax(&mut drawing)?;
-    let quads = quads::regions_as_quads(&drawing)?;
-    finished(surface, &drawing, &quads, params, curvature_tolerance)
+    Ok(drawing)
 }
 
 /// Flat patches, with walls drawn anew, divided by demand, and a centre in each joined to the middles of its sides.
@@ -78,7 +84,7 @@ pub(super) fn in_patches(
 }
 
 /// The squared distance along the normal, integrated over the surface, between an image and what its every `step`th row and column hold.
-fn missed(image: &GeometryImage, step: usize) -> f64 {
+pub(super) fn missed(image: &GeometryImage, step: usize) -> f64 {
     let at = |column: usize, row: usize| {
         let i = image.width * row + column;
         (
@@ -178,7 +184,7 @@ fn bends(surface: &Charted, layout: &PatchLayout, rectangles: &[Rectangle]) -> V
 }
 
 /// Flattens all quads and gives them coordinates, such that both sides of a wall have the same ones along it. `bend` is that of the surface's faces.
-fn placed(
+pub(super) fn placed(
     drawing: &Subdivision,
     bend: &FaceVec<f64>,
     quads: &[Quad],

@@ -1,14 +1,17 @@
 //! Rectangles of small surfaces: common parameters of walls, and maps without folds.
 
+mod clusters;
 mod density;
 mod drawing;
 
+use super::candidate::{in_cluster_drawing, placed};
 use super::flow::Rectangle;
-use super::quads::{Quad, quads};
+use super::glue::Added;
+use super::quads::{Quad, quads, regions_as_quads};
 use super::sides::Drawing;
 use super::subdivision::Subdivision;
 use super::walls::{self, Fractions};
-use super::{Added, RectangleError, division, flow, place, placed};
+use super::{RectangleError, division, flow, place};
 use crate::atlas::cut::cut;
 use crate::atlas::plane::{distance, doubled_area};
 use crate::flow::cones::{BoundaryCondition, Prescription};
@@ -51,29 +54,49 @@ fn drawn(mesh: &Mesh, cones: &[usize]) -> (Subdivision, Vec<Quad>) {
     (drawing.fine, quads)
 }
 
-fn sphere() -> (Subdivision, Vec<Quad>) {
+/// The same surface in about so many clusters.
+fn clustered(mesh: &Mesh, count: usize) -> (Subdivision, Vec<Quad>) {
+    let drawing = in_cluster_drawing(mesh, count).unwrap();
+    let quads = regions_as_quads(&drawing).unwrap();
+    (drawing.fine, quads)
+}
+
+fn sphere_mesh() -> Mesh {
     let cubes = (0..64).map(|i| [i % 4, i / 4 % 4, i / 16]);
-    let mesh = shaken(polycube(cubes, |_, _, _| true));
-    drawn(&mesh, &[0, 17, 40])
+    shaken(polycube(cubes, |_, _, _| true))
+}
+
+fn torus_mesh() -> Mesh {
+    let ring = (0..9).filter(|&i| i != 4).map(|i| [i % 3, i / 3, 0]);
+    shaken(polycube(ring, |_, _, _| true))
+}
+
+fn annulus_mesh() -> Mesh {
+    let squares = (0..42).map(|i| [i % 7, i / 7, 0]);
+    let squares = squares.filter(|q| ![[3, 2, 0], [3, 3, 0]].contains(q));
+    shaken(polycube(squares, |_, axis, sign| axis == 2 && sign == 1))
+}
+
+fn sphere() -> (Subdivision, Vec<Quad>) {
+    drawn(&sphere_mesh(), &[0, 17, 40])
 }
 
 fn torus() -> (Subdivision, Vec<Quad>) {
-    let ring = (0..9).filter(|&i| i != 4).map(|i| [i % 3, i / 3, 0]);
-    drawn(&shaken(polycube(ring, |_, _, _| true)), &[])
+    drawn(&torus_mesh(), &[])
 }
 
 fn annulus() -> (Subdivision, Vec<Quad>) {
-    let squares = (0..42).map(|i| [i % 7, i / 7, 0]);
-    let squares = squares.filter(|q| ![[3, 2, 0], [3, 3, 0]].contains(q));
-    let mesh = polycube(squares, |_, axis, sign| axis == 2 && sign == 1);
-    drawn(&shaken(mesh), &[])
+    drawn(&annulus_mesh(), &[])
 }
 
-fn surfaces() -> [(&'static str, (Subdivision, Vec<Quad>)); 3] {
+fn surfaces() -> [(&'static str, (Subdivision, Vec<Quad>)); 6] {
     [
         ("sphere", sphere()),
         ("torus", torus()),
         ("annulus", annulus()),
+        ("sphere in clusters", clustered(&sphere_mesh(), 8)),
+        ("torus in clusters", clustered(&torus_mesh(), 8)),
+        ("annulus in clusters", clustered(&annulus_mesh(), 5)),
     ]
 }
 

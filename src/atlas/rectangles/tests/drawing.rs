@@ -3,9 +3,8 @@
 use super::super::disk::Disk;
 use super::super::division::{part, places, regions};
 use super::super::sides::Role;
-use super::super::{contract, join, relax, sizes};
+use super::super::{contract, relax, sizes};
 use super::*;
-use crate::geometry::ids::FaceId;
 
 /// Length of the walls that stay, sides of patches in ascending order, length of the shortest side.
 #[derive(Debug)]
@@ -105,15 +104,6 @@ fn bricks() -> Drawing {
     })
 }
 
-/// Squares like those of a chessboard, halved across or upright by their colour: three walls meet where one ends.
-fn halves() -> Drawing {
-    sheet(|p| {
-        let [x, y] = p.map(|x| (x / 8.0).floor() as i32);
-        let within = p[usize::from((x + y) % 2 == 0)].rem_euclid(8.0);
-        [3 * y + x, i32::from(within > 4.0)]
-    })
-}
-
 /// With many creases, and with none.
 fn drawings() -> [(&'static str, Drawing); 3] {
     let cubes = (0..216).map(|i| [i % 6, i / 6 % 6, i / 36]);
@@ -183,50 +173,4 @@ fn walls_drawn_anew_keep_patches_and_sides_and_meet_more_evenly() {
             assert!(way > 1.0 / 3.0, "{before:?} {after:?}");
         }
     }
-}
-
-/// The squared error that is foreseen, and the rectangles.
-fn foreseen(drawing: &Drawing) -> sizes::Total {
-    let floor = sizes::floor(drawing);
-    let size = |start| sizes::size(drawing, &part(drawing, start).unwrap(), floor);
-    let all: Vec<sizes::Size> = regions(drawing).into_iter().map(size).collect();
-    sizes::Total::of(all.iter())
-}
-
-#[test]
-fn halves_are_joined_where_nothing_bends() {
-    const BUDGET: usize = 10_000;
-    let mut drawing = halves();
-    // Where nothing bends at all, nothing is lost or won.
-    assert_eq!(join::join(&mut drawing, BUDGET).unwrap(), 0);
-    let c = &drawing.fine.connectivity;
-    let x = |f| c.face_vertices(f).map(|v| drawing.fine.position[v][0]);
-    let is_bent: FaceVec<bool> = c.faces().map(|f| x(f).iter().sum::<f64>() > 36.0).collect();
-    drawing.bend = is_bent
-        .iter()
-        .map(|&bent| if bent { 100.0 } else { 0.01 })
-        .collect();
-    let bent = |drawing: &Drawing| {
-        let is_bent = |f: &FaceId| is_bent[drawing.fine.parent[*f]];
-        let parts = regions(drawing).into_iter();
-        let parts = parts.map(|start| part(drawing, start).unwrap());
-        parts.filter(|disk| disk.faces.iter().all(is_bent)).count()
-    };
-    let (before, foreseen_before) = (state(&drawing), foreseen(&drawing));
-    let bent_before = bent(&drawing);
-    let gone = join::join(&mut drawing, BUDGET).unwrap();
-    let after = state(&drawing);
-    assert!(foreseen_before.gain(foreseen(&drawing), BUDGET) > 0.0);
-    assert_eq!(before.sides.len(), 18);
-    assert_eq!(after.sides.len() + gone, 18);
-    // Three squares lie where nothing bends.
-    assert!(gone >= 3, "{gone}");
-    assert!(
-        after.sides.iter().all(|&n| n <= division::MOST_SIDES),
-        "{after:?}"
-    );
-    assert!(close(before.fixed, after.fixed), "{before:?} {after:?}");
-    // What bends is divided as it was.
-    assert!(bent_before >= 6, "{bent_before}");
-    assert_eq!(bent(&drawing), bent_before);
 }
