@@ -24,6 +24,8 @@ use rayon::prelude::*;
 
 /// So many times finer than the images is what their error is measured on.
 const MEASURED: usize = 3;
+/// Texels of the images whose error is measured, at most: what is best with so many is with more.
+const JUDGED: usize = 1 << 18;
 
 /// A surface in rectangles.
 pub(super) struct Candidate {
@@ -149,7 +151,8 @@ fn finished(
     let bends = bends(&surface, &layout, &flattened);
     let samples = strips.bent(&bends, params.texel_budget);
     // Rows and columns between those of the images tell what these will miss; bends do not, where a map is crowded.
-    let between = samples.iter().map(|n| n.map(|n| MEASURED * (n - 1) + 1));
+    let judged = strips.bent(&bends, params.texel_budget.min(JUDGED));
+    let between = judged.iter().map(|n| n.map(|n| MEASURED * (n - 1) + 1));
     layout.patches = patches(&flattened, &between.collect::<Vec<_>>(), params);
     let mesh = &surface.mesh;
     let measured = sample(mesh, &layout, &surface.metric.log_scale, image_origin(mesh));

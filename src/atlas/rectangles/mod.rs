@@ -187,18 +187,24 @@ pub fn rectangles(
         }
         found.ok()
     };
-    let tried: Vec<Option<Candidate>> = counts.par_iter().map(|&n| in_clusters(n)).collect();
-    let is_hard = tried.iter().any(Option::is_none);
-    let in_patches =
-        is_hard.then(|| candidate::in_patches(&surface, flat, params, curvature_tolerance));
-    let (in_patches, error) = match in_patches {
-        Some(Ok(found)) => (Some(found), None),
-        Some(Err(error)) => (None, Some(error)),
-        None => (None, None),
+    // One is dropped as soon as there is a better one: each is a whole surface.
+    let (best, all_arrived) = counts
+        .par_iter()
+        .enumerate()
+        .map(|(i, &count)| {
+            let found = in_clusters(count);
+            let arrived = found.is_some();
+            (found.map(|found| (i, found)), arrived)
+        })
+        .reduce(|| (None, true), |a, b| (better(a.0, b.0), a.1 && b.1));
+    let (in_patches, error) = match all_arrived {
+        true => (None, None),
+        false => match candidate::in_patches(&surface, flat, params, curvature_tolerance) {
+            Ok(found) => (Some((counts.len(), found)), None),
+            Err(error) => (None, Some(error)),
+        },
     };
-    // The first of those that are equal.
-    let all = tried.into_iter().chain([in_patches]).flatten();
-    let best = all.min_by(|a, b| a.error.total_cmp(&b.error));
+    let best = better(best, in_patches).map(|(_, found)| found);
     let found = best.ok_or(error.unwrap_or(RectangleError::Inconsistent {
         what: "the clusters of faces",
     }))?;
@@ -209,4 +215,18 @@ pub fn rectangles(
         "patches became rectangles"
     );
     Ok((found.surface, found.layout))
+}
+
+/// The one with less error; the first one, by its number, of those that are equal.
+fn better(
+    a: Option<(usize, Candidate)>,
+    b: Option<(usize, Candidate)>,
+) -> Option<(usize, Candidate)> {
+    match (a, b) {
+        (Some(a), Some(b)) => {
+            let order = a.1.error.total_cmp(&b.1.error).then(a.0.cmp(&b.0));
+            Some(if order.is_le() { a } else { b })
+        }
+        (a, b) => a.or(b),
+    }
 }
