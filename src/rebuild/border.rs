@@ -7,9 +7,9 @@
 //! borders, never by position alone, since different vertices may lie at one point.
 //! *Not guaranteed:* that borders do not cross themselves.
 
-use super::RebuildError;
 use super::frame::Frame;
-use crate::atlas::patches::{Seam, SeamSample};
+use super::{Images, RebuildError};
+use crate::atlas::patches::{Domain, Seam, SeamSample};
 use crate::atlas::plane::distance;
 use crate::geometry::disjoint_sets::UnionFind;
 use crate::geometry::ids::PatchId;
@@ -88,20 +88,21 @@ fn key((uv, position): ([f64; 2], [f64; 3])) -> Key {
     [u, v, x, y, z].map(bits)
 }
 
-/// Checks the seams, and leaves those that are borders of patches.
-pub(super) fn checked(seams: &[Seam], frames: &[Frame]) -> Result<Vec<Seam>, RebuildError> {
-    for (id, seam) in seams.iter().enumerate() {
+/// Checks the seams, and leaves those that are borders of patches: a flat patch may be slit open and have the same coordinates on both sides, a rectangle is whole.
+pub(super) fn checked(images: &Images, frames: &[Frame]) -> Result<Vec<Seam>, RebuildError> {
+    if frames.is_empty() {
+        return Err(RebuildError::NoPatches);
+    }
+    for (id, seam) in images.seams.iter().enumerate() {
         check(id, seam, frames)?;
     }
-    let borders = seams.iter().filter(|seam| !seam.is_inner());
-    Ok(borders.cloned().collect())
+    let is_whole = |patch: PatchId| images.patches[patch.index()].domain == Domain::Rectangle;
+    let is_border = |seam: &&Seam| !(is_whole(seam.left) && seam.is_inner());
+    Ok(images.seams.iter().filter(is_border).cloned().collect())
 }
 
 /// Puts the sides of checked seams in order.
 pub(super) fn borders(seams: &[Seam], frames: &[Frame]) -> Result<Borders, RebuildError> {
-    if frames.is_empty() {
-        return Err(RebuildError::NoPatches);
-    }
     let mut sides: Vec<Vec<Side>> = vec![Vec::new(); frames.len()];
     for (id, seam) in seams.iter().enumerate() {
         let both = [(Some(seam.left), false), (seam.right, true)];

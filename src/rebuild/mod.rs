@@ -37,7 +37,7 @@ pub use error::RebuildError;
 pub use stored::{rebuild_stored, stored_seams};
 
 use crate::atlas::geometry_image::GeometryImage;
-use crate::atlas::patches::{PatchLayout, Seam};
+use crate::atlas::patches::{Domain, PatchLayout, Seam};
 use crate::geometry::connectivity::Topology;
 use frame::Frame;
 use rayon::prelude::*;
@@ -49,6 +49,8 @@ pub struct PatchImage<'a> {
     pub width: usize,
     /// Rows.
     pub height: usize,
+    /// What it is sampled over: a rectangle may lie across the cut.
+    pub domain: Domain,
     /// (column + ½, row + ½, 1) to patch coordinates, in either domain; see [`crate::atlas::patches::Domain::to_centres`].
     pub texel_to_patch: [[f64; 3]; 2],
     /// Surface points, row by row, row 0 at the top.
@@ -77,6 +79,7 @@ impl<'a> Images<'a> {
                 .map(|(patch, image)| PatchImage {
                     width: image.width,
                     height: image.height,
+                    domain: patch.domain(),
                     texel_to_patch: patch.domain().to_centres(patch.texel_to_patch),
                     position: &image.position,
                     alpha: &image.alpha,
@@ -147,7 +150,7 @@ pub fn rebuild(images: &Images<'_>) -> Result<Rebuilt, RebuildError> {
         .enumerate()
         .map(|(id, patch)| Frame::new(id, patch))
         .collect::<Result<Vec<Frame>, _>>()?;
-    let seams = border::checked(images.seams, &frames)?;
+    let seams = border::checked(images, &frames)?;
     let borders = border::borders(&seams, &frames)?;
     let chains = thin::thin(&seams, &frames, &borders)?;
     let bands = images

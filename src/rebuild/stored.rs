@@ -55,15 +55,19 @@ pub fn rebuild_stored(folder: &ImageFolder) -> Result<Rebuilt, RebuildError> {
         patches: folder
             .images
             .iter()
-            .map(|image| PatchImage {
-                width: image.width,
-                height: image.height,
-                texel_to_patch: match image.is_rectangle {
-                    true => Domain::Rectangle.to_centres(image.texel_to_patch),
-                    false => image.texel_to_patch,
-                },
-                position: &image.position,
-                alpha: &image.alpha,
+            .map(|image| {
+                let domain = match image.is_rectangle {
+                    true => Domain::Rectangle,
+                    false => Domain::Flat,
+                };
+                PatchImage {
+                    width: image.width,
+                    height: image.height,
+                    domain,
+                    texel_to_patch: domain.to_centres(image.texel_to_patch),
+                    position: &image.position,
+                    alpha: &image.alpha,
+                }
             })
             .collect(),
         seams: &seams,

@@ -145,7 +145,7 @@ pub struct Seam {
 }
 
 impl Seam {
-    /// Whether this is a part of the cut inside a patch, which has the same coordinates on both sides: no border. Rectangles may lie across the cut.
+    /// Whether both sides have the same coordinates in one patch. Inside a rectangle, which may lie across the cut, this is no border; where a flat patch is slit open it is.
     pub fn is_inner(&self) -> bool {
         self.right == Some(self.left) && self.samples.iter().all(|s| s.left == s.right)
     }

@@ -369,6 +369,7 @@ impl<'a> Clusters<'a> {
     /// Divides clusters that are no disks, or stand out; whether there was one.
     fn divide_others(&mut self) -> bool {
         let mut is_changed = false;
+        let mut distance = FaceVec::filled(f64::INFINITY, self.c().face_count());
         for part in self.parts() {
             let own = self.label[part[0]];
             if part.len() < 2 || self.is_fit(&part) {
@@ -377,10 +378,9 @@ impl<'a> Clusters<'a> {
             is_changed = true;
             let inside: BTreeSet<FaceId> = part.iter().copied().collect();
             let mut from = part[0];
-            let mut distance = FaceVec::filled(f64::INFINITY, self.c().face_count());
             // Twice the farthest: two ends.
             for _ in 0..2 {
-                distance = FaceVec::filled(f64::INFINITY, self.c().face_count());
+                part.iter().for_each(|&f| distance[f] = f64::INFINITY);
                 self.grow(from, own, &mut distance, |f| inside.contains(&f));
                 let farthest = |f: &&FaceId, g: &&FaceId| {
                     distance[**f].total_cmp(&distance[**g]).then(g.cmp(f))
