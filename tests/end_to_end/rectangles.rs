@@ -55,7 +55,14 @@ fn sides(atlas: &Path) -> Vec<Side> {
         let [a, b] = halfedge(h).map(|corner| faces[corner]);
         let p = patch[h / 3] as usize;
         let across = by_ends.get(&[b, a]);
-        let is_inner = across.is_some_and(|&t| patch[t / 3] as usize == p && cut[h] == 0);
+        // A rectangle may lie across the cut, and goes on there.
+        let at = |corner: usize| [uv[2 * corner], uv[2 * corner + 1]];
+        let goes_on = |t: usize| {
+            let ([tail, head], [back, front]) = (halfedge(h), halfedge(t));
+            at(tail) == at(front) && at(head) == at(back)
+        };
+        let is_inner =
+            across.is_some_and(|&t| patch[t / 3] as usize == p && (cut[h] == 0 || goes_on(t)));
         if is_inner {
             continue;
         }
