@@ -5,9 +5,9 @@
 //! the cells between them, and [`STEPS`] points a sample step along shared sides.
 
 use super::basis::Local;
-use super::{FitError, Grids, Interface, Surfaces, parameter};
+use super::{BSplineSurface, FitError, Grid, Grids, Interface, Surfaces, parameter};
 use crate::geometry::deviation::{Triangles, angle, distances};
-use crate::geometry::mesh::{bounding_box, cross, distance, norm};
+use crate::geometry::mesh::{bounding_box, cross, distance, dot, norm, sub};
 use rayon::prelude::*;
 
 /// Points along a shared side for every step between two samples.
@@ -29,6 +29,8 @@ pub struct PatchErrors {
     pub samples: Errors,
     /// Of the surface in the middle of every cell of samples from the mesh, by area.
     pub surface: Errors,
+    /// The part of the surface's area that is turned over: its normal in the middle of a cell points away from that of the cell.
+    pub folded: f64,
 }
 
 /// What lies between two patches.
@@ -63,6 +65,8 @@ struct Sums {
     squares: f64,
     weight: f64,
     max: f64,
+    /// Weight of what is turned over.
+    folded: f64,
 }
 
 impl Sums {
@@ -77,16 +81,32 @@ impl Sums {
             squares: self.squares + other.squares,
             weight: self.weight + other.weight,
             max: self.max.max(other.max),
+            folded: self.folded + other.folded,
+        }
+    }
+
+    /// A sum by weight.
+    fn mean(self, sum: f64) -> f64 {
+        match self.weight > 0.0 {
+            true => sum / self.weight,
+            false => 0.0,
         }
     }
 
     fn errors(self) -> Errors {
-        let mean = self.squares / self.weight;
         Errors {
-            rms: if self.weight > 0.0 { mean.sqrt() } else { 0.0 },
+            rms: self.mean(self.squares).sqrt(),
             max: self.max,
         }
     }
+}
+
+/// The middle of a cell of samples on the surface.
+struct Middle {
+    point: [f64; 3],
+    /// Of the surface, about.
+    area: f64,
+    is_folded: bool,
 }
 
 /// Angles along shared sides.
@@ -141,26 +161,13 @@ pub fn measure(
             sums
         })
         .collect();
-    let middles: Vec<Vec<([f64; 3], f64)>> = grids
+    let middles: Vec<Vec<Middle>> = grids
         .patches
         .par_iter()
         .zip(&surfaces.patches)
-        .map(|(grid, surface)| {
-            let [columns, rows] = grid.lattice.samples;
-            let middle = |i: usize, n: usize| (i as f64 + 0.5) / (n - 1) as f64;
-            let cells = (0..rows - 1).flat_map(|k| (0..columns - 1).map(move |i| (i, k)));
-            let jets = cells.map(|(i, k)| surface.at([middle(i, columns), middle(k, rows)]));
-            let cell = 1.0 / ((columns - 1) * (rows - 1)) as f64;
-            jets.map(|jet| {
-                (
-                    jet.point,
-                    cell * norm(cross(jet.tangent[0], jet.tangent[1])),
-                )
-            })
-            .collect()
-        })
+        .map(|(grid, surface)| middles(grid, surface))
         .collect();
-    let points: Vec<[f64; 3]> = middles.iter().flatten().map(|&(point, _)| point).collect();
+    let points: Vec<[f64; 3]> = middles.iter().flatten().map(|m| m.point).collect();
     let mut off = distances(&points, mesh)
         .ok_or(FitError::NoSurface)?
         .into_iter();
@@ -168,8 +175,11 @@ pub fn measure(
         .iter()
         .map(|patch| {
             let mut sums = Sums::default();
-            for (&(_, area), distance) in patch.iter().zip(&mut off) {
-                sums.add(distance, area);
+            for (middle, distance) in patch.iter().zip(&mut off) {
+                sums.add(distance, middle.area);
+                if middle.is_folded {
+                    sums.folded += middle.area;
+                }
             }
             sums
         })
@@ -180,6 +190,11 @@ pub fn measure(
         .par_iter()
         .map(|interface| across(grids, surfaces, interface))
         .collect();
+    let errors = |samples: Sums, surface: Sums| PatchErrors {
+        samples: samples.errors(),
+        surface: surface.errors(),
+        folded: surface.mean(surface.folded),
+    };
     let total = |sums: &[Sums]| sums.iter().copied().fold(Sums::default(), Sums::join);
     let all_along = along.iter().fold(Along::default(), |a, b| Along {
         gap: a.gap.max(b.gap),
@@ -192,19 +207,33 @@ pub fn measure(
         patches: from_samples
             .iter()
             .zip(&from_mesh)
-            .map(|(samples, surface)| PatchErrors {
-                samples: samples.errors(),
-                surface: surface.errors(),
-            })
+            .map(|(&samples, &surface)| errors(samples, surface))
             .collect(),
         seams: along.into_iter().map(Along::errors).collect(),
-        all: PatchErrors {
-            samples: total(&from_samples).errors(),
-            surface: total(&from_mesh).errors(),
-        },
+        all: errors(total(&from_samples), total(&from_mesh)),
         all_seams: all_along.errors(),
         diagonal: distance(low, high),
     })
+}
+
+/// The middles of all cells, rows of them one after the other.
+fn middles(grid: &Grid, surface: &BSplineSurface) -> Vec<Middle> {
+    let [columns, rows] = grid.lattice.samples;
+    let middle = |i: usize, n: usize| (i as f64 + 0.5) / (n - 1) as f64;
+    let part = 1.0 / ((columns - 1) * (rows - 1)) as f64;
+    let cells = (0..rows - 1).flat_map(|k| (0..columns - 1).map(move |i| (i, k)));
+    let cells = cells.map(|(i, k)| {
+        let at = |across: usize, up: usize| grid.points[(k + up) * columns + i + across];
+        let cell = cross(sub(at(1, 1), at(0, 0)), sub(at(0, 1), at(1, 0)));
+        let jet = surface.at([middle(i, columns), middle(k, rows)]);
+        let normal = cross(jet.tangent[0], jet.tangent[1]);
+        Middle {
+            point: jet.point,
+            area: part * norm(normal),
+            is_folded: dot(normal, cell) < 0.0,
+        }
+    });
+    cells.collect()
 }
 
 /// The basis at every sample of a row.

@@ -14,7 +14,8 @@
 //!
 //! *Guaranteed:* patches meet without gaps: both have the same control points along a shared side, to the last bit, and the same knots; the same
 //! result for any number of threads. *Not guaranteed:* tangents that agree across sides (the surfaces are C² inside and C⁰ between), and a normal
-//! everywhere: at a corner where the angle of a patch is 0 or π there is none.
+//! everywhere: at a corner where the angle of a patch is 0 or π there is none, and where samples crowd beside a bent side, knot intervals may be too long for it and the surface
+//! folds (`measure` says how much of it does).
 //!
 //! C. de Boor, *A Practical Guide to Splines* (1978), chapter XVII for tensor products; L. Piegl, W. Tiller, *The NURBS Book*
 //! (1997), 9.4.

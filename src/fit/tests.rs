@@ -343,6 +343,35 @@ fn distances_and_folds_are_measured() {
     assert_eq!(measure(&grids, &fitted, nothing), Err(FitError::NoSurface));
 }
 
+/// A surface that runs forth, back and forth: x = 10 u³ − 15 u² + 6 u, whose slope is negative for |u − 1/2| < 1/√20.
+#[test]
+fn what_is_turned_over_is_measured() {
+    let grids = alone(sampled([2001, 5], |u, v| [u, v, 0.0]));
+    let mut fitted = fit(&grids, 4000.0).expect("fits");
+    let mesh = Triangles {
+        positions: &[[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [0.0, 9.0, 0.0]],
+        faces: &[[0, 1, 2]],
+    };
+    let flat = measure(&grids, &fitted, mesh).expect("measured");
+    assert_eq!((flat.all.folded, flat.patches[0].folded), (0.0, 0.0));
+    let surface = &mut fitted.patches[0];
+    assert_eq!(surface.size(), [4, 4]);
+    for row in surface.control.chunks_mut(4) {
+        for (control, x) in row.iter_mut().zip([0.0, 2.0, -1.0, 1.0]) {
+            control[0] = x;
+        }
+    }
+    let back = 1.0 / 5f64.sqrt();
+    let exact = back / (1.0 + 2.0 * back);
+    let folded = measure(&grids, &fitted, mesh).expect("measured");
+    assert!(
+        (folded.all.folded - exact).abs() < 1e-5,
+        "{}",
+        folded.all.folded
+    );
+    assert_eq!(folded.all.folded, folded.patches[0].folded);
+}
+
 #[test]
 fn threads_change_nothing() {
     let grids = alone(sampled([60, 44], wavy));

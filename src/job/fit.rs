@@ -195,6 +195,7 @@ impl FittedComponent {
                 "control_points": surface.size(),
                 "sample_error": errors(&error.samples),
                 "surface_error": errors(&error.surface),
+                "folded_area": error.folded,
             })
         });
         let sides =
@@ -223,6 +224,7 @@ impl FittedComponent {
             "control_points": self.surfaces.control_points,
             "sample_error": errors(&all.samples),
             "surface_error": errors(&all.surface),
+            "folded_area": all.folded,
             "gap": all_seams.gap,
             "normal_angle": { "mean": all_seams.mean_normal_angle, "max": all_seams.max_normal_angle },
             "patches": patches.collect::<Vec<_>>(),
@@ -260,7 +262,11 @@ impl fmt::Display for FittedComponent {
             ..
         } = &self.measured;
         let part = |x: f64| x / diagonal;
-        let PatchErrors { samples, surface } = all;
+        let PatchErrors {
+            samples,
+            surface,
+            folded,
+        } = all;
         for (what, errors) in [("samples", samples), ("surface", surface)] {
             writeln!(
                 f,
@@ -275,6 +281,13 @@ impl fmt::Display for FittedComponent {
             part(all_seams.gap),
             all_seams.mean_normal_angle.to_degrees(),
             all_seams.max_normal_angle.to_degrees(),
+        )?;
+        let with_folds = patches.iter().filter(|errors| errors.folded > 0.0).count();
+        writeln!(
+            f,
+            "  turned over: {:.1e} of the area, in {with_folds} of {} surfaces",
+            folded,
+            patches.len(),
         )?;
         let mut order: Vec<usize> = (0..patches.len()).collect();
         let max = |i: usize| patches[i].surface.max;

@@ -4,8 +4,8 @@
 //! there if nothing in the map is nearer. The mean over the directions is the shade.
 
 use super::raster::{Band, NOTHING};
-use super::view::{Vec3, along, dot, finite_box, unit};
-use crate::geometry::mesh::{cross, distance};
+use super::view::{Vec3, along, finite_box, unit};
+use crate::geometry::mesh::{cross, distance, dot};
 use rayon::prelude::*;
 
 /// Shares of the light that reach a point, 0 to 1.

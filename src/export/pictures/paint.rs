@@ -4,8 +4,8 @@ use super::colour::{Linear, mix, to_bytes};
 use super::light::Shade;
 use super::raster::{Band, NOTHING};
 use super::studio::{BAND, Props, SAMPLES, Studio};
-use super::view::{Vec3, along, dot, unit};
-use crate::geometry::mesh::{cross, sub};
+use super::view::{Vec3, along, unit};
+use crate::geometry::mesh::{cross, dot, sub};
 use image::{Rgb, RgbImage};
 use rayon::prelude::*;
 

@@ -85,7 +85,7 @@ impl Marks {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::mesh::{cross, distance, norm, triangle_area};
+    use crate::geometry::mesh::{cross, distance, dot, norm, triangle_area};
 
     #[test]
     fn a_ball_has_its_radius_normals_and_area() {
@@ -103,7 +103,7 @@ mod tests {
         for f in &marks.faces {
             let [a, b, c] = corners(f);
             let n = cross(sub(b, a), sub(c, a));
-            assert!(norm(n) < 1e-9 || super::super::view::dot(n, sub(a, centre)) > 0.0);
+            assert!(norm(n) < 1e-9 || dot(n, sub(a, centre)) > 0.0);
         }
         assert_eq!(marks.faces.len(), marks.colours.len());
     }

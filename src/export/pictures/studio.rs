@@ -9,10 +9,10 @@ use super::floor::Floor;
 use super::light::{Lights, Shade};
 use super::raster::{Band, NOTHING};
 use super::scene::Marks;
-use super::view::{Camera, Vec3, along, choose_direction, dot, unit};
+use super::view::{Camera, Vec3, along, choose_direction, unit};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::FaceId;
-use crate::geometry::mesh::{Mesh, cross, norm, sub};
+use crate::geometry::mesh::{Mesh, cross, dot, norm, sub};
 use rayon::prelude::*;
 
 /// Samples along each side of a pixel.

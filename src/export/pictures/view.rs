@@ -1,16 +1,11 @@
 //! Where to look from: a perspective camera that shows much of the surface.
 
 use super::raster::{Band, NOTHING};
-use crate::geometry::mesh::{bounding_box, cross, distance, norm, sub};
+use crate::geometry::mesh::{bounding_box, cross, distance, dot, norm, sub};
 use rayon::prelude::*;
 
 /// Vectors in space.
 pub type Vec3 = [f64; 3];
-
-/// Scalar product.
-pub fn dot(a: Vec3, b: Vec3) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
 
 /// a + s b
 pub fn along(a: Vec3, s: f64, b: Vec3) -> Vec3 {

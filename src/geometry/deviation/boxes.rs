@@ -1,7 +1,7 @@
 //! The nearest triangle to a point, through a tree of boxes.
 
 use super::{Triangles, corners, normal};
-use crate::geometry::mesh::{bounding_box, distance_to_segment, sub};
+use crate::geometry::mesh::{bounding_box, distance_to_segment, dot, sub};
 
 /// Most triangles in a leaf.
 const LEAF: usize = 4;
@@ -117,10 +117,6 @@ fn divide(triangles: &mut [[[f64; 3]; 3]], first: usize, nodes: &mut Vec<Node>) 
 fn squared_to_box(p: [f64; 3], node: &Node) -> f64 {
     let off = |i: usize| (node.low[i] - p[i]).max(p[i] - node.high[i]).max(0.0);
     (0..3).map(|i| off(i) * off(i)).sum()
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Squared distance of a point from a triangle: which of its corners, sides and inside is nearest follows from six
