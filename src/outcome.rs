@@ -15,6 +15,8 @@ pub enum FailureKind {
     Prescription,
     /// The flow did not reach the curvature asked for.
     NotConverged,
+    /// What was built did not pass the checks of `verify`: it was not published.
+    Unverified,
     /// Took longer than allowed.
     Timeout,
     /// Needed more memory than allowed.
@@ -33,6 +35,7 @@ impl FailureKind {
             Self::Input => "input",
             Self::Prescription => "prescription",
             Self::NotConverged => "not_converged",
+            Self::Unverified => "unverified",
             Self::Timeout => "timeout",
             Self::Memory => "memory",
             Self::Output => "output",

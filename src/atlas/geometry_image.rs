@@ -19,6 +19,7 @@ pub use packed::pack_images;
 
 use crate::atlas::patches::raster::{cover, to_texel};
 use crate::atlas::patches::{Domain, Patch, PatchLayout};
+use crate::geometry::frame::Frame;
 use crate::geometry::ids::{FaceId, NONE, VertexVec};
 use crate::geometry::mesh::{
     AttributeKind, CornerAttribute, Mesh, bounding_box, cross, distance, norm, sub,
@@ -50,11 +51,11 @@ pub struct GeometryImage {
 const FAR_DIAGONALS: f64 = 10.0;
 
 /// What is subtracted from positions before they are rounded to `f32`, in source units: zero, but the
-/// middle of the bounding box (rounded to `f32`) where that lies more than ten diagonals from the origin.
-pub fn image_origin(mesh: &Mesh) -> [f64; 3] {
+/// middle of the bounding box (rounded to `f32`) where that lies more than ten diagonals from the origin. The mesh is in `frame`.
+pub fn image_origin(mesh: &Mesh, frame: &Frame) -> [f64; 3] {
     let (low, high) = bounding_box(mesh.positions.as_slice());
-    let middle: [f64; 3] = std::array::from_fn(|i| low[i] + 0.5 * (high[i] - low[i]));
-    if norm(middle) > FAR_DIAGONALS * distance(low, high) {
+    let middle = frame.leave(std::array::from_fn(|i| low[i] + 0.5 * (high[i] - low[i])));
+    if norm(middle) > FAR_DIAGONALS * frame.length(distance(low, high)) {
         middle.map(|x| f64::from(x as f32))
     } else {
         [0.0; 3]
@@ -399,7 +400,7 @@ mod tests {
             &PatchParams::default(),
         )
         .unwrap();
-        let origin = image_origin(&sample.mesh);
+        let origin = image_origin(&sample.mesh, &Frame::default());
         let images = super::sample(&sample.mesh, &layout, &sample.log_scale, origin);
         (layout, images)
     }
@@ -407,11 +408,11 @@ mod tests {
     #[test]
     fn far_models_get_an_origin_that_f32_holds() {
         let mut sample = samples::square(4);
-        assert_eq!(image_origin(&sample.mesh), [0.0; 3]);
+        assert_eq!(image_origin(&sample.mesh, &Frame::default()), [0.0; 3]);
         for p in sample.mesh.positions.as_mut_slice() {
             p[0] += 123456.789;
         }
-        let origin = image_origin(&sample.mesh);
+        let origin = image_origin(&sample.mesh, &Frame::default());
         assert!((origin[0] - 123457.289).abs() < 0.01);
         assert!(origin.iter().all(|&x| f64::from(x as f32) == x));
         let (_, images) = sampled(&sample);

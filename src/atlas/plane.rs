@@ -1,5 +1,7 @@
 //! Rigid motions and similarities of the plane.
 
+use crate::geometry::mesh::PLAIN_SQUARES;
+
 /// p ↦ R(rotation) p + translation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RigidMotion {
@@ -78,7 +80,12 @@ pub fn doubled_area(t: [[f64; 2]; 3]) -> f64 {
 
 /// Euclidean distance.
 pub fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (b[0] - a[0]).hypot(b[1] - a[1])
+    let d = [b[0] - a[0], b[1] - a[1]];
+    let square = d[0] * d[0] + d[1] * d[1];
+    match PLAIN_SQUARES.contains(&square) {
+        true => square.sqrt(),
+        false => d[0].hypot(d[1]),
+    }
 }
 
 #[cfg(test)]

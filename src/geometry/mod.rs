@@ -2,6 +2,7 @@
 pub mod connectivity;
 pub mod deviation;
 pub(crate) mod disjoint_sets;
+pub mod frame;
 pub mod ids;
 pub mod mesh;
 pub mod triangle;

@@ -15,6 +15,7 @@ use crate::geometry::mesh::Mesh;
 use crate::outcome::{Failure, FailureKind};
 use crate::read::ReadError;
 use crate::repair::{ComponentError, RepairError};
+use crate::verify::{Check, Verdicts};
 
 /// Why there is no atlas: the error of the stage that stopped.
 #[derive(Debug, thiserror::Error)]
@@ -55,6 +56,9 @@ pub enum BuildError {
     /// The patches could not be made rectangles.
     #[error(transparent)]
     Rectangle(#[from] RectangleError),
+    /// What was written did not pass its own checks, and was not published.
+    #[error(transparent)]
+    Unverified(#[from] Unverified),
     /// Nothing could be written.
     #[error(transparent)]
     Export(ExportError),
@@ -62,6 +66,45 @@ pub enum BuildError {
     #[error("stopped before it was finished: nothing was written")]
     Cancelled,
 }
+
+/// An atlas that does not pass [`verify`](crate::verify): the checks that failed, with their figures.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the atlas did not pass {} of its {checks} checks and was not published ({}); mend what `affine-atlas explain` shows of the mesh (very thin faces, coordinates without digits), or ask for weaker or more cones",
+    failed.len(),
+    listed(failed)
+)]
+pub struct Unverified {
+    /// The checks that failed.
+    pub failed: Vec<Check>,
+    /// How many there were.
+    pub checks: usize,
+}
+
+impl Unverified {
+    /// What failed of these verdicts; `None` where nothing did.
+    pub fn of(verdicts: &Verdicts) -> Option<Self> {
+        let failed = verdicts.checks.iter().filter(|check| !check.passed);
+        let failed: Vec<Check> = failed.cloned().collect();
+        (!verdicts.all_passed()).then_some(Self {
+            failed,
+            checks: verdicts.checks.len(),
+        })
+    }
+}
+
+/// The first failed checks with their figures.
+fn listed(failed: &[Check]) -> String {
+    let shown = failed.iter().take(LISTED_CHECKS);
+    let mut words: Vec<String> = shown.map(|c| format!("{}: {}", c.name, c.figure)).collect();
+    if failed.len() > LISTED_CHECKS {
+        words.push(format!("{} more", failed.len() - LISTED_CHECKS));
+    }
+    words.join("; ")
+}
+
+/// Failed checks that a message quotes.
+const LISTED_CHECKS: usize = 4;
 
 impl BuildError {
     /// An error of the flow, with the indices of the input file in place of the mesh's own.
@@ -96,6 +139,7 @@ impl BuildError {
                 FailureKind::NotConverged
             }
             BuildError::Rectangle(_) => FailureKind::Internal,
+            BuildError::Unverified(_) => FailureKind::Unverified,
             BuildError::Export(error) if error.is_internal() => FailureKind::Internal,
             BuildError::Export(_) => FailureKind::Output,
             BuildError::Cancelled => FailureKind::Internal,

@@ -76,11 +76,11 @@ pub fn inspect(path: &Path, config: &Config) -> Result<Inspection, BuildError> {
             changes.as_str()
         };
         line(format!("  repair: {changes}"));
-        let mut offend = |region| {
-            regions.push(RegionOf {
-                component: i,
-                ..region
-            })
+        let frame = component.frame;
+        let mut offend = |mut region: RegionOf| {
+            region.component = i;
+            frame.leave_all(&mut region.mesh.positions);
+            regions.push(region)
         };
         match plan(component, &requests, config, &mut line, &mut offend) {
             Ok(()) => {}

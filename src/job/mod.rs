@@ -15,7 +15,7 @@ pub mod rebuild;
 pub mod survey;
 pub mod texture;
 
-pub use error::BuildError;
+pub use error::{BuildError, Unverified};
 pub use inspect::{Inspection, inspect};
 
 use flatten::{Flattened, flatten, refine_for};
@@ -38,6 +38,7 @@ use crate::read::{self, SourceAsset};
 use crate::rebuild::Images;
 use crate::repair::{self, Component};
 use crate::report;
+use crate::verify::{VerifyOptions, verify_atlas};
 use std::path::Path;
 use std::time::Instant;
 
@@ -98,6 +99,7 @@ fn build_component(
     enter: impl Fn(&'static str) -> Result<(), BuildError>,
 ) -> Result<AffineAtlas, BuildError> {
     enter("cones")?;
+    let frame = component.frame;
     let mesh = component.mesh?;
     let prescription = cones::prescribe(&mesh, requests, &config.cones, &config.boundary)?;
     let (given, given_faces) = (mesh.positions.clone(), mesh.connectivity.to_faces());
@@ -152,8 +154,9 @@ fn build_component(
         charts,
     } = surface;
     enter("images")?;
-    let image_origin = geometry_image::image_origin(&mesh);
-    let images = geometry_image::sample(&mesh, &patches, &metric.log_scale, image_origin);
+    let image_origin = geometry_image::image_origin(&mesh, &frame);
+    let origin = frame.enter(image_origin);
+    let images = geometry_image::sample(&mesh, &patches, &metric.log_scale, origin);
     let images = match &source {
         Some(source) => geometry_image::sample_attributes(&mesh, &patches, images, source),
         None => images,
@@ -165,7 +168,7 @@ fn build_component(
         positions: given.as_slice(),
         faces: &given_faces,
     };
-    let readable = Images::new(&patches, &images, image_origin);
+    let readable = Images::new(&patches, &images, origin);
     let (quality, rebuilt) = report::measure_images(quality, given, &readable, topology);
     let image_distance = rebuilt
         .filter(|_| config.report.enabled)
@@ -176,7 +179,7 @@ fn build_component(
             };
             distances(mesh.positions.as_slice(), rebuilt)
         });
-    Ok(AffineAtlas {
+    let atlas = AffineAtlas {
         topology,
         seamless: report::is_seamless(&charts),
         repair: component.log.counts(),
@@ -195,7 +198,8 @@ fn build_component(
         image_origin,
         connectivity_repair,
         quality,
-    })
+    };
+    Ok(atlas.leave(&frame))
 }
 
 /// Reads, builds and writes one asset into `output/id`. `given` is the path as the user wrote it.
@@ -241,7 +245,7 @@ fn run_stages(
         tracing::warn!(asset = outcome.id, channel = channel.name(), "{note}");
         outcome.notes.push(note);
     }
-    let atlases = build(&asset.soup, config, observer)?;
+    let mut atlases = build(&asset.soup, config, observer)?;
     if atlases
         .iter()
         .any(|a| matches!(a, Err(BuildError::Cancelled)))
@@ -258,10 +262,9 @@ fn run_stages(
             outcome.notes.push(note);
         }
     }
-    observer.stage("write", 0, 1);
     let folder = output.join(&outcome.id);
     if atlases.iter().any(Result::is_ok) {
-        write(
+        let unverified = write(
             &asset,
             given,
             output,
@@ -270,6 +273,9 @@ fn run_stages(
             &atlases,
             observer,
         )?;
+        for (component, error) in unverified {
+            atlases[component] = Err(error.into());
+        }
     }
     outcome.files = list_files(&folder).unwrap_or_default();
     let several = atlases.len() > 1;
@@ -307,7 +313,8 @@ fn unmet(atlas: &AffineAtlas, params: &PatchParams) -> Vec<String> {
     notes
 }
 
-/// Writes all components into one folder that replaces the older one in one step.
+/// Writes all components into one folder that replaces the older one in one step. What does not pass the checks of [`verify`] is not
+/// published and given back, by component; an older one stays in its place.
 fn write(
     asset: &SourceAsset,
     given: &str,
@@ -316,13 +323,14 @@ fn write(
     config: &Config,
     atlases: &[Result<AffineAtlas, BuildError>],
     observer: &dyn Observer,
-) -> Result<(), ExportError> {
+) -> Result<Vec<(usize, Unverified)>, ExportError> {
     let go_on = || match observer.cancelled() {
         true => Err(ExportError::Interrupted),
         false => Ok(()),
     };
     let staging = Staging::begin(output, id)?;
     let config_blake3 = config.hash();
+    let (mut unverified, mut new) = (Vec::new(), false);
     for (component, atlas) in atlases.iter().enumerate() {
         let subfolder = match atlases.len() {
             1 => String::new(),
@@ -342,8 +350,20 @@ fn write(
             appearance: &asset.soup.appearance,
             asset: id,
         };
+        observer.stage("write", component, atlases.len());
         export::write_component(&staging, &subfolder, atlas, &provenance)?;
         go_on()?;
+        observer.stage("verify", component, atlases.len());
+        let written = staging.path().join(&subfolder);
+        let verdicts = verify_atlas(&written, &VerifyOptions::default(), None);
+        if let Some(error) = Unverified::of(&verdicts) {
+            unverified.push((component, error));
+            staging.withdraw(&subfolder)?;
+            continue;
+        }
+        new = true;
+        go_on()?;
+        observer.stage("pages", component, atlases.len());
         if config.pictures.enabled {
             pictures::write(&staging, &subfolder, atlas, config.pictures.size)?;
         }
@@ -353,5 +373,8 @@ fn write(
         }
         go_on()?;
     }
-    staging.publish()
+    if new {
+        staging.publish()?;
+    }
+    Ok(unverified)
 }

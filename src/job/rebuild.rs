@@ -160,7 +160,8 @@ fn compare(
         ours.add(&component.mesh.positions, &component.mesh.faces);
     }
     for component in repaired.components {
-        let mesh = component.mesh?;
+        let mut mesh = component.mesh?;
+        component.frame.leave_all(&mut mesh.positions);
         theirs.add(mesh.positions.as_slice(), &mesh.connectivity.to_faces());
     }
     let (low, high) = bounding_box(&theirs.positions);

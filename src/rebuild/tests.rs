@@ -32,7 +32,7 @@ fn lay(s: &Sample, texels: usize) -> Laid {
         &params,
     )
     .unwrap();
-    let origin = image_origin(&s.mesh);
+    let origin = image_origin(&s.mesh, &crate::geometry::frame::Frame::default());
     let images = sample(&s.mesh, &layout, &s.log_scale, origin);
     Laid {
         layout,

@@ -1,7 +1,8 @@
 //! From glued faces to meshes: one vertex a fan, one mesh a component, no doubled edge.
 
 use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{EdgeId, HalfedgeId, HalfedgeVec, NONE, VertexId};
+use crate::geometry::frame::Frame;
+use crate::geometry::ids::{EdgeId, HalfedgeId, HalfedgeVec, NONE, VertexId, VertexVec};
 use crate::geometry::mesh::{AttributeKind, CornerAttribute, Mesh, Soup, cross, sub};
 use crate::repair::clean::DraftFace;
 use crate::repair::glue::Gluing;
@@ -62,6 +63,11 @@ pub fn assemble(
             let v = surface_vertex[glued.fan[corner] as usize];
             vertices.partition_point(|&w| w < v) as u32
         };
+        let corners: Vec<[f64; 3]> = (vertices.iter())
+            .map(|&v| soup.positions[fan_home[v as usize].0 as usize])
+            .collect();
+        let frame = Frame::of(&corners);
+        let positions = corners.iter().map(|&p| frame.enter(p)).collect();
         let mesh = match contradiction[c] {
             Some([face, neighbour]) => Err(ComponentError::NonOrientable {
                 face,
@@ -77,6 +83,7 @@ pub fn assemble(
                     &glued,
                     faces,
                     source,
+                    positions,
                     local,
                     &mut changes,
                 )
@@ -90,6 +97,7 @@ pub fn assemble(
             first_source_face: lowest_source.unwrap_or(NONE),
             first_source_vertex: lowest_vertex.unwrap_or(NONE),
             log: RepairLog::default(),
+            frame,
         });
     }
     for v in 0..stands_for.len() {
@@ -210,6 +218,7 @@ fn build(
     glued: &Glued,
     faces: &[u32],
     source_vertex: Vec<u32>,
+    positions: VertexVec<[f64; 3]>,
     local: impl Fn(usize) -> u32,
     changes: &mut Vec<Change>,
 ) -> Result<Mesh, ComponentError> {
@@ -236,10 +245,7 @@ fn build(
         .collect();
     let mut mesh = Mesh {
         connectivity,
-        positions: source_vertex
-            .iter()
-            .map(|&v| soup.positions[v as usize])
-            .collect(),
+        positions,
         source_vertex: source_vertex.into(),
         source_face: faces.iter().map(|&f| draft[f as usize].source).collect(),
         face_material: faces

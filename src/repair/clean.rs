@@ -10,7 +10,7 @@
 //!      a - b - c            a - b - c        is split at b. The surface stays where it is.
 //! ```
 
-use crate::geometry::mesh::{Soup, distance};
+use crate::geometry::mesh::distance;
 use crate::repair::log::{Change, RemovalReason};
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeSet, HashMap};
@@ -32,9 +32,14 @@ pub struct DraftFace {
 }
 
 /// The faces that stay, in the order of the file; parts of split faces at the end.
-pub fn clean(soup: &Soup, stands_for: &[u32], changes: &mut Vec<Change>) -> Vec<DraftFace> {
-    let mut faces = Vec::with_capacity(soup.faces.len());
-    for (f, corners) in soup.faces.iter().enumerate() {
+pub fn clean(
+    positions: &[[f64; 3]],
+    given: &[[u32; 3]],
+    stands_for: &[u32],
+    changes: &mut Vec<Change>,
+) -> Vec<DraftFace> {
+    let mut faces = Vec::with_capacity(given.len());
+    for (f, corners) in given.iter().enumerate() {
         let vertices = corners.map(|v| stands_for[v as usize]);
         let [a, b, c] = vertices;
         if a == b || b == c || c == a {
@@ -51,8 +56,8 @@ pub fn clean(soup: &Soup, stands_for: &[u32], changes: &mut Vec<Change>) -> Vec<
         }
     }
     drop_duplicates(&mut faces, changes);
-    if faces.iter().any(|f| middle_corner(f, soup).is_some()) {
-        take_out_collinear(&mut faces, soup, changes);
+    if faces.iter().any(|f| middle_corner(f, positions).is_some()) {
+        take_out_collinear(&mut faces, positions, changes);
         faces.sort_by_key(|f| f.source);
         drop_duplicates(&mut faces, changes);
     }
@@ -166,8 +171,8 @@ fn drop_flaps(faces: &mut Vec<DraftFace>, two_sided: Vec<bool>, changes: &mut Ve
 }
 
 /// The corner that lies on the opposite side, where the face is collinear.
-fn middle_corner(face: &DraftFace, soup: &Soup) -> Option<usize> {
-    let p = face.vertices.map(|v| soup.positions[v as usize]);
+fn middle_corner(face: &DraftFace, positions: &[[f64; 3]]) -> Option<usize> {
+    let p = face.vertices.map(|v| positions[v as usize]);
     let opposite: [f64; 3] = std::array::from_fn(|k| distance(p[(k + 1) % 3], p[(k + 2) % 3]));
     let longest = (0..3).fold(0, |k, j| if opposite[j] > opposite[k] { j } else { k });
     let short = opposite[(longest + 1) % 3] + opposite[(longest + 2) % 3];
@@ -180,14 +185,14 @@ fn edge(a: u32, b: u32) -> (u32, u32) {
 
 /// Takes out collinear faces as the module docs show, lowest first. A face that is split may become
 /// collinear itself and wait in turn; the number of rounds is bounded, and what is left then stays.
-fn take_out_collinear(faces: &mut Vec<DraftFace>, soup: &Soup, changes: &mut Vec<Change>) {
+fn take_out_collinear(faces: &mut Vec<DraftFace>, positions: &[[f64; 3]], changes: &mut Vec<Change>) {
     let mut slots: Vec<Option<DraftFace>> = faces.drain(..).map(Some).collect();
     let mut at_edge: HashMap<(u32, u32), BTreeSet<usize>> = HashMap::new();
     let mut waiting = BTreeSet::new();
     for (i, face) in slots.iter().enumerate() {
         let Some(face) = face else { continue };
         enlist(&mut at_edge, i, face);
-        if middle_corner(face, soup).is_some() {
+        if middle_corner(face, positions).is_some() {
             waiting.insert(i);
         }
     }
@@ -196,7 +201,7 @@ fn take_out_collinear(faces: &mut Vec<DraftFace>, soup: &Soup, changes: &mut Vec
         let Some(face) = slots[i].clone() else {
             continue;
         };
-        let Some(k) = middle_corner(&face, soup).filter(|_| rounds_left > 0) else {
+        let Some(k) = middle_corner(&face, positions).filter(|_| rounds_left > 0) else {
             continue;
         };
         rounds_left -= 1;
@@ -221,10 +226,10 @@ fn take_out_collinear(faces: &mut Vec<DraftFace>, soup: &Soup, changes: &mut Vec
                 face: other.source,
                 at: b,
             });
-            let [first, second] = halves(&other, [a, c], b, soup);
+            let [first, second] = halves(&other, [a, c], b, positions);
             for (slot, half) in [(j, first), (slots.len(), second)] {
                 enlist(&mut at_edge, slot, &half);
-                if middle_corner(&half, soup).is_some() {
+                if middle_corner(&half, positions).is_some() {
                     waiting.insert(slot);
                 }
                 if slot == slots.len() {
@@ -270,8 +275,8 @@ fn remove(
 }
 
 /// The two parts of a face whose side between `ends` is split at vertex `b`; the part at `ends[0]` first.
-fn halves(face: &DraftFace, ends: [u32; 2], b: u32, soup: &Soup) -> [DraftFace; 2] {
-    let p = |v: u32| soup.positions[v as usize];
+fn halves(face: &DraftFace, ends: [u32; 2], b: u32, positions: &[[f64; 3]]) -> [DraftFace; 2] {
+    let p = |v: u32| positions[v as usize];
     let corner = |v: u32| face.vertices.iter().position(|&w| w == v).unwrap_or(0);
     let [at_a, at_c] = ends.map(corner);
     let (near, far) = (distance(p(ends[0]), p(b)), distance(p(b), p(ends[1])));

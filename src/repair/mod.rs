@@ -2,7 +2,8 @@
 //!
 //! *Enters:* a [`Soup`]: nothing welded, nothing oriented, nothing removed.
 //! *Leaves:* connected [`Component`]s, each a [`Mesh`] without doubled edges, or the reason why it
-//! is none; where every vertex of the file went; every change by name and place.
+//! is none; where every vertex of the file went; every change by name and place. Positions of a component are those of its [`Frame`]: a box of unit
+//! size at the origin, whatever the units of the file.
 //!
 //! The steps, each in its own file:
 //!
@@ -28,9 +29,17 @@ pub mod log;
 pub mod weld;
 
 use crate::geometry::connectivity::ConnectivityError;
+use crate::geometry::frame::{EXPONENTS, Frame, times_power_of_two};
 use crate::geometry::ids::{NONE, VertexId};
-use crate::geometry::mesh::{Mesh, Soup};
+use crate::geometry::mesh::{Mesh, Soup, bounding_box, distance};
+use clean::DraftFace;
 pub use log::{Change, RemovalReason, RepairLog};
+
+/// Distance of neighbouring float64 numbers where a mesh lies, as a part of its size, beyond which points on its edges and faces cannot be
+/// written in source units any more. Float32 tells as much apart.
+const COARSEST: f64 = 1.0 / (1 << 22) as f64;
+/// A mesh that was this many times as long as what faces without area leave of it has lost its extent.
+const LOST: f64 = 1e3;
 
 /// What repair may do.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -108,6 +117,48 @@ pub enum RepairError {
         /// Allowed.
         most: usize,
     },
+    /// The mesh is larger or smaller than what float32 can hold.
+    #[error(
+        "the mesh is {size:.1e} units long and reaches out to {reach:.1e}, but images and surface.glb hold float32, whose numbers allow sizes from {least:.1e} to {most:.1e}: give the mesh in other units"
+    )]
+    Range {
+        /// Longest side of its box.
+        size: f64,
+        /// Largest absolute coordinate.
+        reach: f64,
+        /// Least size that can be written.
+        least: f64,
+        /// Largest size, or coordinate, that can be written.
+        most: f64,
+    },
+    /// The mesh lies so far from the origin that new points cannot be written.
+    #[error(
+        "the mesh is {size:.1e} units long but lies {reach:.1e} from the origin, where float64 tells points apart that are {step:.1e} from each other, {part:.1e} of its size (most: {most:.1e}): move it to the origin in the program that made it, where its digits are still known"
+    )]
+    FarFromOrigin {
+        /// Longest side of its box.
+        size: f64,
+        /// Largest absolute coordinate.
+        reach: f64,
+        /// Distance of neighbouring numbers there.
+        step: f64,
+        /// The same as a part of the size.
+        part: f64,
+        /// Largest part with which a surface can be written.
+        most: f64,
+    },
+    /// Nearly all of the mesh's extent is due to vertices whose faces have no area in float64.
+    #[error(
+        "vertex {vertex} lies {distance:.1e} units from the next one that is left, {times:.1e} times the size of the rest: float64 knows no area of the faces at it, and without them the mesh loses its extent; correct its position or remove it"
+    )]
+    LostVertex {
+        /// Vertex.
+        vertex: usize,
+        /// Distance from the box of the surviving faces.
+        distance: f64,
+        /// The same in lengths of the longest side of that box.
+        times: f64,
+    },
     /// The welding tolerance is out of range.
     #[error(
         "repair.weld_tolerance is {given}, but must be 0 (exactly equal positions) or from 1e-12 to 0.1 of the bounding box's diagonal"
@@ -173,6 +224,8 @@ pub struct Component {
     pub first_source_vertex: u32,
     /// The changes that concern it. Where there is one component only, all changes.
     pub log: RepairLog,
+    /// Takes the mesh's positions back to source units.
+    pub frame: Frame,
 }
 
 /// Everything that repair leaves.
@@ -204,15 +257,20 @@ impl Repaired {
 /// Repairs a soup; see the module docs.
 pub fn repair(soup: &Soup, params: &RepairParams) -> Result<Repaired, RepairError> {
     check_input(soup, params)?;
+    let frame = Frame::of(&soup.positions);
+    check_range(&frame)?;
+    // Products of lengths in source units could overflow or vanish.
+    let positions: Vec<_> = soup.positions.iter().map(|&p| frame.enter(p)).collect();
     let mut changes = Vec::new();
-    let stands_for = weld::weld(soup, params, &mut changes);
-    let draft = clean::clean(soup, &stands_for, &mut changes);
+    let stands_for = weld::weld(&positions, &soup.faces, params, &mut changes);
+    let draft = clean::clean(&positions, &soup.faces, &stands_for, &mut changes);
     if draft.is_empty() {
         return Err(RepairError::NoFaces {
             faces: soup.faces.len(),
         });
     }
-    let gluing = glue::glue(&draft, &soup.positions, &mut changes);
+    check_extent(&positions, &soup.faces, &draft, &frame)?;
+    let gluing = glue::glue(&draft, &positions, &mut changes);
     let repaired = assemble::assemble(soup, &stands_for, &draft, &gluing, changes);
     if repaired.components.len() > params.max_components {
         return Err(RepairError::TooManyComponents {
@@ -227,6 +285,60 @@ pub fn repair(soup: &Soup, params: &RepairParams) -> Result<Repaired, RepairErro
             first: first.to_string(),
         }),
         _ => Ok(repaired),
+    }
+}
+
+/// Refuses what float32 outputs, or float64 at that distance from the origin, cannot hold.
+fn check_range(frame: &Frame) -> Result<(), RepairError> {
+    let size = frame.length(1.0);
+    let [least, most] = [*EXPONENTS.start(), *EXPONENTS.end()].map(|k| times_power_of_two(1.0, k));
+    if !EXPONENTS.contains(&frame.exponent()) || frame.reach() > most {
+        return Err(RepairError::Range {
+            size,
+            reach: frame.reach(),
+            least,
+            most,
+        });
+    }
+    let part = frame.resolution();
+    if part > COARSEST {
+        return Err(RepairError::FarFromOrigin {
+            size,
+            reach: frame.reach(),
+            step: frame.length(part),
+            part,
+            most: COARSEST,
+        });
+    }
+    Ok(())
+}
+
+/// Refuses a mesh that loses its extent with the faces that were taken out: their farthest vertex lies so far from the rest that its faces
+/// have no area in float64, though their corners may lie on no line.
+fn check_extent(
+    positions: &[[f64; 3]],
+    given: &[[u32; 3]],
+    draft: &[DraftFace],
+    frame: &Frame,
+) -> Result<(), RepairError> {
+    let left: Vec<[f64; 3]> = (draft.iter().flat_map(|f| f.vertices))
+        .map(|v| positions[v as usize])
+        .collect();
+    let (low, high) = bounding_box(&left);
+    let size = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
+    let beyond = |v: &u32| {
+        let p = positions[*v as usize];
+        distance(p, std::array::from_fn(|i| p[i].clamp(low[i], high[i])))
+    };
+    let used = given.iter().flatten();
+    let far = used.max_by(|a, b| beyond(a).total_cmp(&beyond(b)));
+    match far.map(|v| (*v, beyond(v))) {
+        Some((vertex, distance)) if distance > LOST * size => Err(RepairError::LostVertex {
+            vertex: vertex as usize,
+            distance: frame.length(distance),
+            times: distance / size,
+        }),
+        _ => Ok(()),
     }
 }
 

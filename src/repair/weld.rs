@@ -6,35 +6,40 @@
 //! face) of the file's own connectivity: a vertex whose fans are all complete lacks nothing. Ends of one edge
 //! at one position are joined in any case, since no metric has an edge of length zero.
 
-use crate::geometry::mesh::{Soup, bounding_box, distance};
+use crate::geometry::mesh::{bounding_box, distance};
 use crate::repair::RepairParams;
 use crate::repair::log::Change;
 use std::collections::HashMap;
 
-/// For every vertex the one that stands for it (itself, or a lower index at the same position);
+/// For every vertex the one that stands for it (itself, or a lower index at the same position). `faces` are those of the file;
 /// adds a change for each that is gone and for each that no face uses.
-pub fn weld(soup: &Soup, params: &RepairParams, changes: &mut Vec<Change>) -> Vec<u32> {
-    let mut stands_for: Vec<u32> = (0..soup.positions.len() as u32).collect();
+pub fn weld(
+    positions: &[[f64; 3]],
+    faces: &[[u32; 3]],
+    params: &RepairParams,
+    changes: &mut Vec<Change>,
+) -> Vec<u32> {
+    let mut stands_for: Vec<u32> = (0..positions.len() as u32).collect();
     if params.weld {
-        let open = open_vertices(soup);
+        let open = open_vertices(positions.len(), faces);
         if params.weld_tolerance > 0.0 {
-            let (low, high) = bounding_box(&soup.positions);
+            let (low, high) = bounding_box(positions);
             let radius = params.weld_tolerance * distance(low, high);
-            weld_within(&soup.positions, &open, radius, low, &mut stands_for);
+            weld_within(positions, &open, radius, low, &mut stands_for);
         } else {
-            weld_equal(&soup.positions, &open, &mut stands_for);
+            weld_equal(positions, &open, &mut stands_for);
         }
     }
-    for face in &soup.faces {
+    for face in faces {
         for k in 0..3 {
             let (a, b) = (face[k], face[(k + 1) % 3]);
-            if soup.positions[a as usize] == soup.positions[b as usize] {
+            if positions[a as usize] == positions[b as usize] {
                 join(&mut stands_for, a, b);
             }
         }
     }
-    let mut used = vec![false; soup.positions.len()];
-    for &v in soup.faces.iter().flatten() {
+    let mut used = vec![false; positions.len()];
+    for &v in faces.iter().flatten() {
         used[v as usize] = true;
     }
     for v in 0..stands_for.len() as u32 {
@@ -50,16 +55,15 @@ pub fn weld(soup: &Soup, params: &RepairParams, changes: &mut Vec<Change>) -> Ve
 }
 
 /// Every vertex on an edge that has one face only.
-fn open_vertices(soup: &Soup) -> Vec<bool> {
-    let mut edges: Vec<(u32, u32)> = soup
-        .faces
+fn open_vertices(vertices: usize, faces: &[[u32; 3]]) -> Vec<bool> {
+    let mut edges: Vec<(u32, u32)> = faces
         .iter()
         .flat_map(|f| (0..3).map(|k| (f[k], f[(k + 1) % 3])))
         .filter(|(a, b)| a != b)
         .map(|(a, b)| (a.min(b), a.max(b)))
         .collect();
     edges.sort_unstable();
-    let mut open = vec![false; soup.positions.len()];
+    let mut open = vec![false; vertices];
     for same in edges.chunk_by(|a, b| a == b) {
         if same.len() == 1 {
             open[same[0].0 as usize] = true;

@@ -21,12 +21,22 @@ impl Worst {
     }
 }
 
+/// The root of a sum of squares, by the slower `hypot` only where squares may have overflowed or vanished.
+fn root(square: f64, hypot: impl Fn() -> f64) -> f64 {
+    if (1e-200..1e200).contains(&square) {
+        square.sqrt()
+    } else {
+        hypot()
+    }
+}
+
 pub(super) fn sub2(a: Point2, b: Point2) -> Point2 {
     [a[0] - b[0], a[1] - b[1]]
 }
 
 pub(super) fn distance2(a: Point2, b: Point2) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
+    let [x, y] = sub2(a, b);
+    root(x * x + y * y, || x.hypot(y))
 }
 
 pub(super) fn sub3(a: Point3, b: Point3) -> Point3 {
@@ -42,7 +52,8 @@ pub(super) fn cross3(a: Point3, b: Point3) -> Point3 {
 }
 
 pub(super) fn norm3(a: Point3) -> f64 {
-    a[0].hypot(a[1]).hypot(a[2])
+    let [x, y, z] = a;
+    root(x * x + y * y + z * z, || x.hypot(y).hypot(z))
 }
 
 pub(super) fn distance3(a: Point3, b: Point3) -> f64 {

@@ -41,30 +41,35 @@ impl Grid {
             items: Vec::new(),
         };
         let mut total = 0usize;
+        let mut counts = std::mem::take(&mut grid.start);
         for outline in outlines {
-            for (row, from, to) in grid.spans(outline, margin) {
+            grid.spans(outline, margin, |row, from, to| {
                 total += to - from + 1;
-                if total > limit {
-                    return Err(TooManyEntries);
+                // Counting more would cost too much.
+                if total <= limit {
+                    let cells = row * columns + from + 1..=row * columns + to + 1;
+                    counts[cells].iter_mut().for_each(|count| *count += 1);
                 }
-                for column in from..=to {
-                    grid.start[row * columns + column + 1] += 1;
-                }
+                total <= limit
+            });
+            if total > limit {
+                return Err(TooManyEntries);
             }
         }
+        grid.start = counts;
         for cell in 1..grid.start.len() {
             grid.start[cell] += grid.start[cell - 1];
         }
         let mut next = grid.start.clone();
         let mut items = vec![0; total];
         for (item, outline) in (0u32..).zip(outlines) {
-            for (row, from, to) in grid.spans(outline, margin) {
-                for column in from..=to {
-                    let slot = &mut next[row * columns + column];
+            grid.spans(outline, margin, |row, from, to| {
+                for slot in &mut next[row * columns + from..=row * columns + to] {
                     items[*slot as usize] = item;
                     *slot += 1;
                 }
-            }
+                true
+            });
         }
         grid.items = items;
         Ok(grid)
@@ -78,18 +83,18 @@ impl Grid {
         cell((x - self.origin[0]) * self.density[0], self.columns)
     }
 
-    /// For every row of cells that an outline meets: the row, the first and the last column.
+    /// Tells every row of cells that an outline meets, with the first and the last column, until `tell` says no.
     fn spans<const N: usize>(
         &self,
         outline: &[Point2; N],
         margin: f64,
-    ) -> Vec<(usize, usize, usize)> {
+        mut tell: impl FnMut(usize, usize, usize) -> bool,
+    ) {
         let extent = Extent2::of(outline.iter().copied());
         let (first, last) = (
             self.row(extent.min[1] - margin),
             self.row(extent.max[1] + margin),
         );
-        let mut spans = Vec::with_capacity(last - first + 1);
         for row in first..=last {
             // A little more than the row, so that rounding loses nothing.
             let low = self.origin[1] + (row as f64 - 1e-6) / self.density[1] - margin;
@@ -113,10 +118,11 @@ impl Grid {
             }
             if from <= to {
                 let (from, to) = (self.column(from - margin), self.column(to + margin));
-                spans.push((row, from, to));
+                if !tell(row, from, to) {
+                    return;
+                }
             }
         }
-        spans
     }
 
     /// Items that come near the cell of a point.

@@ -290,8 +290,8 @@ fn verify_manifest(
     );
 }
 
-/// One folder with one `atlas.json`.
-fn verify_atlas(
+/// Verifies a folder that holds one `atlas.json`, and compares with a source where one is given.
+pub fn verify_atlas(
     folder: &Path,
     options: &VerifyOptions,
     source: Option<&SourceSurface<'_>>,

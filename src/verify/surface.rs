@@ -69,6 +69,14 @@ impl<'a> Surface<'a> {
                 self.doubled += group.len();
                 continue;
             }
+            // Nearly every edge: one face on each side.
+            if let [(_, _, h), (_, _, t)] = *group
+                && self.tail(h as usize) != self.tail(t as usize)
+            {
+                self.twin[h as usize] = t;
+                self.twin[t as usize] = h;
+                continue;
+            }
             let (mut back, forth): (Vec<u32>, Vec<u32>) = group
                 .iter()
                 .map(|key| key.2)

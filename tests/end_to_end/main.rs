@@ -19,6 +19,7 @@ mod refusals;
 mod replacing;
 mod survey;
 mod texture;
+mod units;
 
 /// Files of the run as a whole, beside the folders of assets.
 const OF_THE_RUN: [&str; 6] = [

@@ -196,7 +196,7 @@ mod tests {
         let s = build(&faces, positions, uv.clone(), |_, _| false, [0.0; 2]);
         let layout = charts_of(&s.mesh, &uv.into(), &PatchParams::default()).unwrap();
         assert_eq!(layout.patches.len(), 1);
-        let origin = image_origin(&s.mesh);
+        let origin = image_origin(&s.mesh, &crate::geometry::frame::Frame::default());
         let images = sample(&s.mesh, &layout, &s.log_scale, origin);
         let rebuilt = rebuild(&Images::new(&layout, &images, origin)).unwrap();
         rebuilt.expect_topology(0, 0, 2).unwrap();

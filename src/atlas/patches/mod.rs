@@ -44,7 +44,7 @@ mod tests;
 
 use crate::atlas::cut::CutGraph;
 use crate::atlas::develop::{Development, Unfolded};
-use crate::atlas::geometry_image::{image_origin, sample};
+use crate::atlas::geometry_image::sample;
 use crate::atlas::overlay::Layout;
 use crate::atlas::plane::Similarity;
 use crate::atlas::texels::{Bend, FINER};
@@ -384,7 +384,7 @@ fn rasters_by_bend(
         ..layout.clone()
     };
     let no_scale = VertexVec::filled(0.0, mesh.connectivity.vertex_count());
-    let trial = sample(mesh, &trial, &no_scale, image_origin(mesh));
+    let trial = sample(mesh, &trial, &no_scale, [0.0; 3]);
     let bends = trial.iter().zip(contents);
     let bends: Vec<Bend> = bends.map(|(image, n)| Bend::of(image, n)).collect();
     let even = resolution::rasters(oriented, sums, params);

@@ -52,7 +52,7 @@ fn check(s: &Sample, params: &PatchParams) -> Checked {
         params,
     )
     .unwrap();
-    let images = sample(&s.mesh, &layout, &s.log_scale, image_origin(&s.mesh));
+    let images = sample(&s.mesh, &layout, &s.log_scale, image_origin(&s.mesh, &crate::geometry::frame::Frame::default()));
     let mut faces = vec![Vec::new(); layout.patches.len()];
     for (f, p) in layout.face_patch.enumerate() {
         faces[p.index()].push(f);
@@ -148,7 +148,7 @@ fn check_image(
     assert!(image.width.max(image.height) >= params.min_side);
     let m = patch.texel_to_patch;
     let size = s.mesh.diagonal();
-    let origin = image_origin(&s.mesh);
+    let origin = image_origin(&s.mesh, &crate::geometry::frame::Frame::default());
     let mut covered = vec![false; image.width * image.height];
     for row in 0..image.height {
         for column in 0..image.width {

@@ -15,7 +15,7 @@ use super::{
     Charted, RectangleError, clusters, contract, density, division, flow, glue, lift, parity,
     place, quadrangulate, quads, relax, sizes, walls,
 };
-use crate::atlas::geometry_image::{GeometryImage, image_origin, sample};
+use crate::atlas::geometry_image::{GeometryImage, sample};
 use crate::atlas::patches::{Patch, PatchLayout, PatchParams, packed, seams};
 use crate::atlas::texels::{Bend, FINER};
 use crate::geometry::ids::{EdgeVec, FaceVec, PatchId};
@@ -155,7 +155,7 @@ fn finished(
     let between = judged.iter().map(|n| n.map(|n| MEASURED * (n - 1) + 1));
     layout.patches = patches(&flattened, &between.collect::<Vec<_>>(), params);
     let mesh = &surface.mesh;
-    let measured = sample(mesh, &layout, &surface.metric.log_scale, image_origin(mesh));
+    let measured = sample(mesh, &layout, &surface.metric.log_scale, [0.0; 3]);
     let error = measured.iter().map(|image| missed(image, MEASURED)).sum();
     layout.patches = patches(&flattened, &samples, params);
     layout.seams = seams(
@@ -176,7 +176,7 @@ fn finished(
 /// How the surface bends along the sides of every quad, as images of even texels see it.
 fn bends(surface: &Charted, layout: &PatchLayout, rectangles: &[Rectangle]) -> Vec<Bend> {
     let mesh = &surface.mesh;
-    let images = sample(mesh, layout, &surface.metric.log_scale, image_origin(mesh));
+    let images = sample(mesh, layout, &surface.metric.log_scale, [0.0; 3]);
     let bends = images.iter().map(Bend::of_grid).zip(rectangles);
     bends
         .map(|(bend, rectangle)| match rectangle.origin % 2 {

@@ -218,6 +218,17 @@ impl Staging {
         Ok(true)
     }
 
+    /// Takes back what was written of a component, and keeps what the older output has of it, as [`Staging::keep_previous`] does. Where
+    /// the component is the whole asset (no subfolder), there is nothing left to publish.
+    pub fn withdraw(&self, subfolder: &str) -> Result<bool, ExportError> {
+        if subfolder.is_empty() {
+            return Ok(false);
+        }
+        let path = self.inside(subfolder)?;
+        fs::remove_dir_all(&path).map_err(ExportError::io(Action::Write, &path))?;
+        self.keep_previous(subfolder)
+    }
+
     /// Puts the folder in place. On an error the older folder is where it was.
     pub fn publish(self) -> Result<(), ExportError> {
         sync_folders(&self.path).map_err(ExportError::io(Action::Publish, &self.target))?;

@@ -208,11 +208,11 @@ fn nearest(
 ) -> Option<(usize, VertexId, u32)> {
     let meshes = repaired.components.iter().enumerate();
     meshes
-        .filter_map(|(c, component)| Some((c, component.mesh.as_ref().ok()?)))
-        .flat_map(|(c, mesh)| {
+        .filter_map(|(c, component)| Some((c, component.frame, component.mesh.as_ref().ok()?)))
+        .flat_map(|(c, frame, mesh)| {
             mesh.positions
                 .enumerate()
-                .map(move |(v, p)| (c, mesh, v, *p))
+                .map(move |(v, p)| (c, mesh, v, frame.leave(*p)))
         })
         // Only vertices of the file: a name for the message is needed.
         .filter(|&(_, mesh, v, _)| mesh.source_vertex[v] != NONE && candidate(mesh, v))

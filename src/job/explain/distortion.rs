@@ -10,6 +10,7 @@ use crate::export::glb::marked::{Mark, Marked};
 use crate::flow::cones::{Prescription, in_pi};
 use crate::flow::ricci::FlatMetric;
 use crate::geometry::disjoint_sets::UnionFind;
+use crate::geometry::frame::Frame;
 use crate::geometry::ids::NONE;
 use crate::geometry::mesh::{Mesh, bounding_box, distance};
 use crate::read::metric::StoredMetric;
@@ -52,8 +53,13 @@ struct Region {
 }
 
 impl Flat {
-    /// Of a metric in memory.
-    pub fn of(mesh: &Mesh, metric: &FlatMetric, prescription: &Prescription) -> Flat {
+    /// Of a metric in memory, on a surface in its frame.
+    pub fn of(
+        mesh: &Mesh,
+        metric: &FlatMetric,
+        prescription: &Prescription,
+        frame: &Frame,
+    ) -> Flat {
         let cones = prescription.cones.iter().map(|cone| {
             let source = mesh.source_vertex[cone.vertex];
             Cone {
@@ -63,7 +69,7 @@ impl Flat {
             }
         });
         Flat {
-            positions: mesh.positions.as_slice().to_vec(),
+            positions: mesh.positions.iter().map(|&p| frame.leave(p)).collect(),
             faces: mesh.connectivity.to_faces(),
             source_face: mesh.source_face.as_slice().to_vec(),
             cones: cones.collect(),

@@ -32,9 +32,9 @@ pub(super) fn places(error: &BuildError) -> Places {
     };
     match error {
         BuildError::Repair(RepairError::VertexOutOfRange { face, .. }) => faces(vec![*face as u32]),
-        BuildError::Repair(RepairError::NonFinitePosition { vertex }) => {
-            vertices(vec![*vertex as u32])
-        }
+        BuildError::Repair(
+            RepairError::NonFinitePosition { vertex } | RepairError::LostVertex { vertex, .. },
+        ) => vertices(vec![*vertex as u32]),
         BuildError::Component(ComponentError::NonOrientable {
             face, neighbour, ..
         }) => faces(vec![*face, *neighbour]),

@@ -124,6 +124,7 @@ pub fn mesh(path: &Path, config: &Config) -> Result<Explanation, BuildError> {
 
 /// Everything up to the flat metric.
 fn flat(component: Component, requests: &Requests, config: &Config) -> Result<Flat, BuildError> {
+    let frame = component.frame;
     let mesh = component.mesh?;
     let prescription = cones::prescribe(&mesh, requests, &config.cones, &config.boundary)?;
     let Flattened {
@@ -132,7 +133,7 @@ fn flat(component: Component, requests: &Requests, config: &Config) -> Result<Fl
         prescription,
         ..
     } = flatten(mesh, prescription, config, &(), &|_| Ok(()))?;
-    Ok(Flat::of(&mesh, &metric, &prescription))
+    Ok(Flat::of(&mesh, &metric, &prescription, &frame))
 }
 
 /// Explains what a build wrote: where the atlas is distorted.

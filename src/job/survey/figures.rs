@@ -3,6 +3,7 @@
 use super::super::flatten::Flattened;
 use super::first_vertices;
 use crate::flow::cones::{Cone, ConeSpec};
+use crate::geometry::frame::Frame;
 use crate::geometry::mesh::Mesh;
 use crate::product::{MeanMax, Spread};
 use crate::report;
@@ -49,15 +50,16 @@ pub struct Scene {
 }
 
 impl Figures {
-    /// Measures a flat surface that was made from `mesh`; `inside` are its cones inside the surface.
+    /// Measures a flat surface that was made from `mesh`, both in `frame`; `inside` are its cones inside the surface.
     pub(super) fn measure(
         mesh: &Mesh,
         flat: &Flattened,
         inside: Vec<Cone>,
         list: Option<Vec<ConeSpec>>,
+        frame: &Frame,
     ) -> Self {
         let distortion = report::distortion(&flat.mesh, &flat.metric);
-        let place = |v| flat.mesh.positions[v];
+        let place = |v| frame.leave(flat.mesh.positions[v]);
         let cut = flat.cut.is_cut.enumerate().filter(|&(_, &is_cut)| is_cut);
         let cones = flat.prescription.cones.iter().map(|cone| Marked {
             position: place(cone.vertex),
@@ -72,7 +74,7 @@ impl Figures {
             area_distortion: distortion.area_distortion,
             log_scale: distortion.log_scale,
             angle_error: distortion.angle_error,
-            cut_length: report::cut_length(&flat.mesh, &flat.cut),
+            cut_length: frame.length(report::cut_length(&flat.mesh, &flat.cut)),
             max_curvature_error: flat.metric.max_curvature_error,
             scene: Scene {
                 log_scale: first_vertices(&flat.metric.log_scale, vertices),

@@ -162,7 +162,9 @@ struct Task<'a> {
 impl Task<'_> {
     fn component(&self, counts: Option<&[usize]>) -> Result<ComponentSurvey, BuildError> {
         let index = self.index;
-        let mesh = match &self.repaired.components[index].mesh {
+        let component = &self.repaired.components[index];
+        let frame = component.frame;
+        let mut mesh = match &component.mesh {
             Ok(mesh) => mesh.clone(),
             Err(error) => {
                 return Ok(ComponentSurvey {
@@ -176,11 +178,12 @@ impl Task<'_> {
         let c = &mesh.connectivity;
         let topology = c.topology();
         let faces = c.faces().map(|f| triangle_area(mesh.face_positions(f)));
-        let area = faces.sum();
+        let area = frame.area(faces.sum());
         let mut rows = Vec::new();
         for (strategy, asked) in candidates(&mesh, &topology, counts) {
             rows.push(self.row(&mesh, strategy, asked)?);
         }
+        frame.leave_all(&mut mesh.positions);
         let mut survey = ComponentSurvey {
             index,
             surface: Ok(Surface {
@@ -243,7 +246,8 @@ impl Task<'_> {
             false => Ok(()),
         };
         let flat = flatten(mesh.clone(), prescription, &config, self.observer, &enter)?;
-        Ok(Figures::measure(mesh, &flat, inside, specs))
+        let frame = &self.repaired.components[self.index].frame;
+        Ok(Figures::measure(mesh, &flat, inside, specs, frame))
     }
 
     fn requests(&self, config: &Config) -> Result<Requests, BuildError> {

@@ -53,7 +53,7 @@ fn parts_hold_the_surface_better_with_as_many_texels() {
     }
     let measure = |domain| {
         let layout = laid_out(&bumpy, domain);
-        let origin = image_origin(&bumpy.mesh);
+        let origin = image_origin(&bumpy.mesh, &crate::geometry::frame::Frame::default());
         let images = sample(&bumpy.mesh, &layout, &bumpy.log_scale, origin);
         let texels: usize = images.iter().map(|i| i.width * i.height).sum();
         let made = rebuild(&Images::new(&layout, &images, origin)).unwrap();

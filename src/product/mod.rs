@@ -1,4 +1,6 @@
-//! What a job yields for one component: the affine atlas with everything that is written of it.
+//! What a job yields for one component: the affine atlas with everything that is written of it, in source units.
+
+mod units;
 
 use crate::atlas::charts::Charts;
 use crate::atlas::cut::CutGraph;
