@@ -112,7 +112,7 @@ fn few(names: &[String]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flow::cones::BoundaryCondition;
+    use crate::flow::prescription::BoundaryCondition;
     use crate::geometry::ids::{VertexId, VertexVec};
     use crate::geometry::mesh::Soup;
     use crate::repair::{RepairParams, repair};

@@ -2,8 +2,9 @@
 
 use crate::atlas::geometry_image::{Channel, Precision};
 use crate::atlas::patches::Domain;
+use crate::flow::refine::ConnectivityRepair;
 use crate::flow::ricci::{FlowStep, PackingFit, Scheme, Solver};
-use crate::product::{ConnectivityRepair, Quality};
+use crate::product::Quality;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

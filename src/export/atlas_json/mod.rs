@@ -11,7 +11,7 @@ use crate::atlas::charts::ChartKind;
 use crate::atlas::geometry_image::ImageParams;
 use crate::atlas::plane::{RigidMotion, wrap_angle};
 use crate::export::{ExportError, Provenance, periods};
-use crate::flow::cones::BoundaryCondition;
+use crate::flow::prescription::BoundaryCondition;
 use crate::geometry::ids::NONE;
 use crate::product::AffineAtlas;
 use std::f64::consts::FRAC_PI_2;
