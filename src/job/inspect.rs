@@ -2,7 +2,8 @@
 
 mod existence;
 
-use super::{BuildError, listing, refine_for};
+use super::listing::{self, counted};
+use super::{BuildError, refine_for};
 use crate::config::Config;
 use crate::export::ExportError;
 use crate::export::glb::region::{self, RegionOf};
@@ -173,9 +174,4 @@ fn describe(
     for words in listing::cones(mesh, prescription) {
         line(format!("  {words}"));
     }
-}
-
-/// A count with its noun.
-pub(super) fn counted(count: usize, one: &str, several: &str) -> String {
-    format!("{count} {}", if count == 1 { one } else { several })
 }
