@@ -19,7 +19,7 @@ pub struct GeometryImage {
     pub face: Vec<u32>,
     /// Log scale, interpolated; dilated.
     pub log_scale: Vec<f32>,
-    /// Attributes of the source, where they were asked for ([`sample_attributes`]); dilated.
+    /// Attributes of the source, where they were asked for ([`sample_attributes`](super::sample_attributes)); dilated.
     pub attributes: Vec<Sampled>,
 }
 
@@ -42,7 +42,7 @@ pub enum Values {
         /// Texels × components.
         values: Vec<f32>,
     },
-    /// A number of something, or [`NONE`].
+    /// A number of something, or [`NONE`](crate::geometry::ids::NONE).
     Ids(Vec<u32>),
 }
 
