@@ -8,7 +8,7 @@
 //! what grows most, and a part that shrinks to nothing costs its area only. A cone of π or more has ∫e^{4u} = ∞ on a smooth
 //! surface, so the distortion around it is one of the mesh.
 
-use super::placement::dot;
+use super::dot::dot;
 use super::quadratic::{Limits, Quadratic};
 use rayon::prelude::*;
 

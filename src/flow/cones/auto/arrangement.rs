@@ -2,8 +2,8 @@
 //!
 //! *Enters:* vertices. *Leaves:* the log scale that each of them causes, the best curvatures, and (9) in the linear picture.
 
-use super::Found;
 use super::area::{Points, Weighed};
+use super::found::Found;
 use super::placement::Placement;
 use super::quadratic::Limits;
 use std::sync::Arc;

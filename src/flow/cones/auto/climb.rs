@@ -3,45 +3,42 @@
 //! *Enters:* a worth of every vertex. *Leaves:* a vertex worth more than its neighbours, found uphill from the best of some samples. The worth
 //! of a place for a cone is a smooth function but for the cones that are there, so few samples are enough.
 
-use super::placement::Placement;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::VertexId;
 
 /// Samples to climb from.
 const SUMMITS: usize = 6;
 
-impl Placement<'_> {
-    /// Vertices worth more than their neighbours, the best first: uphill from the best of some vertices with their worth. `worth` gets a buffer
-    /// of its own.
-    pub(super) fn climb(
-        &self,
-        starts: impl Iterator<Item = (usize, f64)>,
-        taken: impl Fn(usize) -> bool,
-        worth: impl Fn(usize, &mut Vec<f64>) -> f64,
-    ) -> Vec<(usize, f64)> {
-        let mut row = Vec::new();
-        let mut tops: Vec<(usize, f64)> = Vec::new();
-        for mut top in summits(starts.filter(|start| !taken(start.0))) {
-            loop {
-                let around = self.connectivity.neighbours(VertexId::new(top.0));
-                let next = around
-                    .map(VertexId::index)
-                    .filter(|&w| !taken(w))
-                    .map(|w| (w, worth(w, &mut row)))
-                    .fold(top, |a, b| if b.1 > a.1 { b } else { a });
-                if next.0 == top.0 {
-                    break;
-                }
-                top = next;
+/// Vertices worth more than their neighbours, the best first: uphill from the best of some vertices with their worth. `worth` gets a buffer
+/// of its own.
+pub(super) fn climb(
+    connectivity: &Connectivity,
+    starts: impl Iterator<Item = (usize, f64)>,
+    taken: impl Fn(usize) -> bool,
+    worth: impl Fn(usize, &mut Vec<f64>) -> f64,
+) -> Vec<(usize, f64)> {
+    let mut row = Vec::new();
+    let mut tops: Vec<(usize, f64)> = Vec::new();
+    for mut top in summits(starts.filter(|start| !taken(start.0))) {
+        loop {
+            let around = connectivity.neighbours(VertexId::new(top.0));
+            let next = around
+                .map(VertexId::index)
+                .filter(|&w| !taken(w))
+                .map(|w| (w, worth(w, &mut row)))
+                .fold(top, |a, b| if b.1 > a.1 { b } else { a });
+            if next.0 == top.0 {
+                break;
             }
-            if tops.iter().all(|t| t.0 != top.0) {
-                tops.push(top);
-            }
+            top = next;
         }
-        // Stable: of equals the first found.
-        tops.sort_by(|a, b| b.1.total_cmp(&a.1));
-        tops
+        if tops.iter().all(|t| t.0 != top.0) {
+            tops.push(top);
+        }
     }
+    // Stable: of equals the first found.
+    tops.sort_by(|a, b| b.1.total_cmp(&a.1));
+    tops
 }
 
 /// The few that are worth most.

@@ -21,7 +21,9 @@ mod area;
 mod arrangement;
 mod cells;
 mod climb;
+mod dot;
 mod far;
+mod found;
 mod moves;
 mod near;
 mod picture;
@@ -30,14 +32,16 @@ mod quadratic;
 mod quantum;
 mod search;
 
-use super::{
-    BoundaryCondition, BoundaryParams, ConeError, ConeObjective, ConeParams, DEFAULT_COUNT,
-    RequestedCone, Requests, boundary, spread,
-};
+use super::error::ConeError;
+use super::params::{BoundaryParams, ConeObjective, ConeParams, DEFAULT_COUNT};
+use super::request::{RequestedCone, Requests};
+use super::{boundary, spread};
+use crate::flow::prescription::BoundaryCondition;
 use crate::geometry::connectivity::Topology;
 use crate::geometry::ids::{VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
 use arrangement::Rule;
+use found::{Found, cheapest};
 use moves::FINE;
 use picture::Picture;
 use placement::{Choice, Placement};
@@ -45,8 +49,6 @@ use quadratic::Limits;
 use quantum::Quanta;
 use std::f64::consts::TAU;
 
-/// Share of the least variance of the log scale that counts as hardly more: a quarter of the standard deviation.
-const NEAR_COST: f64 = 0.6;
 /// Share of the real cost by which the linear picture may be wrong before it is corrected.
 const AS_PROMISED: f64 = 0.02;
 /// Curvatures in excess of a limit that are rounding, radians.
@@ -97,7 +99,7 @@ pub(super) fn select(
         return Ok(Vec::new());
     }
     let is_free = topology.boundary_loops > 0 && condition == BoundaryCondition::Free;
-    let mut picture = Picture::new(mesh, is_free).map_err(not_chosen)?;
+    let mut picture = Picture::new(mesh, is_free)?;
     let mut background: Vec<f64> = given.curvature;
     let own = background.iter_mut().zip(&picture.curvature);
     own.for_each(|(b, k)| *b -= k);
@@ -163,26 +165,6 @@ struct Search<'a> {
     quanta: Option<Quanta>,
 }
 
-/// Cones, and what they cost.
-struct Found {
-    vertices: Vec<usize>,
-    curvature: Vec<f64>,
-    /// By the objective.
-    cost: f64,
-    /// ln of (9) + 1, in the linear picture; 0 where there is nothing to compare with.
-    distortion: f64,
-}
-
-/// The choice that costs least; of those that cost hardly more, the one of least distortion. Among whole quanta a little of the one buys much of
-/// the other: a cone of 3/2 π instead of three of π/2 makes (9) many times as large.
-fn cheapest(found: Vec<Found>) -> Option<Found> {
-    let least = found.iter().map(|f| f.cost).fold(f64::INFINITY, f64::min);
-    // A variance of nothing may be negative by rounding.
-    let hardly_more = least + NEAR_COST * least.abs();
-    let near = found.into_iter().filter(|f| f.cost <= hardly_more);
-    near.reduce(|a, b| if b.distortion < a.distortion { b } else { a })
-}
-
 impl Search<'_> {
     /// The best cones within the limits of the placement; `None` where no whole quanta meet the total.
     fn run(&self, placement: &mut Placement) -> Result<Vec<Found>, ConeError> {
@@ -197,7 +179,7 @@ impl Search<'_> {
             None => placement.search(self.most),
         };
         let mut choice =
-            choice.ok_or_else(|| not_chosen("places for cones cannot be told apart"))?;
+            choice.ok_or_else(|| ConeError::not_chosen("places for cones cannot be told apart"))?;
         if !is_start {
             choice = placement.drop_idle(choice, self.least);
         }
@@ -289,12 +271,6 @@ impl Search<'_> {
         let next = placement.real_log_scale(&moved.vertices, &moved.curvature);
         moved.cost = cost(placement, &next);
         if moved.cost < now { moved } else { found }
-    }
-}
-
-fn not_chosen(reason: impl ToString) -> ConeError {
-    ConeError::NotChosen {
-        reason: reason.to_string(),
     }
 }
 

@@ -10,13 +10,13 @@
 //! A surface with boundary is doubled, as in the flow; a field has one value a vertex of the surface. Where the boundary is free,
 //! u = 0 there and curvature need not add up to anything.
 
-use super::placement::dot;
+use super::dot::dot;
+use crate::flow::cones::error::ConeError;
 use crate::flow::delaunay::Delaunay;
 use crate::flow::doubled::Doubled;
+use crate::flow::laplacian::{Hessian, System, Unknowns};
 use crate::flow::metric::{Evaluation, Metric};
-use crate::flow::ricci::FlowError;
-use crate::flow::ricci::moved;
-use crate::flow::ricci::system::{Hessian, System, Unknowns};
+use crate::flow::scale::moved;
 use crate::geometry::ids::{NONE, VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, triangle_area};
 
@@ -50,10 +50,10 @@ pub(super) struct Picture {
 
 impl Picture {
     /// Flips to the Delaunay triangulation and factorises. `is_free`: u = 0 on the boundary.
-    pub(super) fn new(mesh: &Mesh, is_free: bool) -> Result<Self, FlowError> {
+    pub(super) fn new(mesh: &Mesh, is_free: bool) -> Result<Self, ConeError> {
         let surface = &mesh.connectivity;
         let length = surface.edges().map(|e| mesh.edge_length(e)).collect();
-        let doubled = Doubled::new(surface)?;
+        let doubled = Doubled::new(surface).map_err(ConeError::not_chosen)?;
         let copies = if surface.is_closed() { 1.0 } else { 2.0 };
         let base_length = doubled.on_both(surface, &length);
         let Doubled {
@@ -80,7 +80,7 @@ impl Picture {
             scale_free: false,
             flips: 0,
         };
-        let mut system = System::new(&unknowns, None)?;
+        let mut system = System::new(&unknowns, None).map_err(ConeError::not_chosen)?;
         let mut laplacian = system.assemble(connectivity, &weight);
         let area = vertex_areas(mesh);
         if !is_free {
@@ -262,15 +262,16 @@ fn squares(
     matrix: &Hessian,
     area: &[f64],
     copies: f64,
-) -> Result<Vec<f64>, FlowError> {
+) -> Result<Vec<f64>, ConeError> {
     let unknown: Vec<u32> = system.unknown.as_slice()[..area.len()].to_vec();
-    let mut inverse = |t: f64| -> Result<Vec<f64>, FlowError> {
+    let mut inverse = |t: f64| -> Result<Vec<f64>, ConeError> {
         let mut shifted = matrix.diagonal.clone();
         for (&i, a) in unknown.iter().zip(area).filter(|(i, _)| **i != NONE) {
             shifted[i as usize] += t * copies * a;
         }
         let solver = &mut system.solver;
-        solver.factorize(&shifted, &matrix.off_diagonal)?;
+        let factorized = solver.factorize(&shifted, &matrix.off_diagonal);
+        factorized.map_err(ConeError::not_chosen)?;
         let diagonal = solver.inverse_diagonal();
         let at = |&i: &u32| match i {
             NONE => 0.0,

@@ -13,6 +13,8 @@
 //!
 //! [`climb`](super::climb) looks for the vertex worth most, [`search`](super::search) puts cones there.
 
+use super::climb::{climb, sample};
+use super::dot::dot;
 use super::picture::Picture;
 use super::quadratic::{Best, Limits, Quadratic};
 use crate::flow::solve::solve_dense;
@@ -103,7 +105,7 @@ impl<'a> Placement<'a> {
             base_energy: 0.0,
             slope: Vec::new(),
             self_energy: picture.self_energies(&sink),
-            samples: super::climb::sample(connectivity, &allowed, &base, SAMPLES),
+            samples: sample(connectivity, &allowed, &base, SAMPLES),
             base,
             background,
             picture,
@@ -315,7 +317,7 @@ impl<'a> Placement<'a> {
         // Stable: of equals the first.
         starts.sort_by(|a, b| b.1.total_cmp(&a.1));
         starts.truncate(CLIMBS);
-        let tops = self.climb(starts.into_iter(), taken, gain).into_iter();
+        let tops = climb(self.connectivity, starts.into_iter(), taken, gain).into_iter();
         tops.map(|(v, gain)| (v, self.base_energy - gain)).collect()
     }
 
@@ -399,7 +401,7 @@ impl<'a> Placement<'a> {
             }
         };
         let now = self.base_energy + chosen.energy;
-        let tops = self.climb(starts.into_iter(), taken, gain).into_iter();
+        let tops = climb(self.connectivity, starts.into_iter(), taken, gain).into_iter();
         Some(tops.map(|(v, gain)| (v, now - gain)).collect())
     }
 
@@ -451,19 +453,4 @@ impl<'a> Placement<'a> {
 /// Adds c times b to a.
 fn add_scaled(a: &mut [f64], c: f64, b: &[f64]) {
     a.iter_mut().zip(b).for_each(|(a, b)| *a += c * b);
-}
-
-/// Σ a b in a fixed order.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // Four sums side by side are quicker than one.
-    let mut sums = [0.0; 4];
-    let (whole_a, rest_a) = a.as_chunks::<4>();
-    let (whole_b, rest_b) = b.as_chunks::<4>();
-    for (a, b) in whole_a.iter().zip(whole_b) {
-        for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
-            *sum += a * b;
-        }
-    }
-    let rest: f64 = rest_a.iter().zip(rest_b).map(|(a, b)| a * b).sum();
-    sums[0] + sums[1] + (sums[2] + sums[3]) + rest
 }

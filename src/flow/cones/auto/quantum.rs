@@ -7,9 +7,10 @@
 //! place, with or without giving a quantum to another cone, cones of nothing disappear and new ones of one quantum appear.
 //! Every step lowers the energy, so it ends.
 
-use super::Found;
 use super::area::Points;
 use super::arrangement::{Arrangement, Rule};
+use super::climb::climb;
+use super::found::Found;
 use super::moves::FINE;
 use super::placement::{Choice, Placement, Site};
 use super::quadratic::Limits;
@@ -248,7 +249,7 @@ fn best_place(
             let mut none = Vec::new();
             let samples = placement.samples.iter().map(|&v| (v, worth(v, &mut none)));
             let samples: Vec<(usize, f64)> = samples.collect();
-            let tops = placement.climb(samples.into_iter(), taken, worth);
+            let tops = climb(placement.connectivity, samples.into_iter(), taken, worth);
             let &(vertex, gain) = tops.first()?;
             Some((vertex, k, rest - gain))
         })
