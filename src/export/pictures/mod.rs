@@ -55,6 +55,9 @@ fn side(size: usize) -> usize {
     size.clamp(SIDE_RANGE[0], SIDE_RANGE[1])
 }
 
+/// Name of the picture that stands for an asset.
+pub const PREVIEW: &str = "preview.png";
+
 /// Draws all pictures of an atlas into a staging folder; `subfolder` as for
 /// [`write_component`](crate::export::write_component).
 pub fn write(
@@ -66,7 +69,7 @@ pub fn write(
     // One view and one light for both pictures of space.
     let portrait = surface::Portrait::new(atlas, size);
     let pictures = [
-        ("preview.png", portrait.preview()),
+        (PREVIEW, portrait.preview()),
         ("layout.png", layout(atlas, size)),
         ("log-scale.png", portrait.log_scale()),
         ("convergence.png", convergence(atlas, size)),
