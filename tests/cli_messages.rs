@@ -93,7 +93,8 @@ fn init_writes_the_commented_configuration_once() {
 fn init_then_build_where_meshes_are() {
     let folder = folder();
     let place = |name: &str| folder.path().join(name);
-    let cube = good("genus-0-cube.obj");
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures");
+    let cube = fixtures.join("good/genus-0-cube.obj");
     std::fs::create_dir(place("project")).expect("a folder");
     std::fs::copy(&cube, place("project/cube.obj")).expect("copied");
     let inside = place("project");
@@ -102,7 +103,11 @@ fn init_then_build_where_meshes_are() {
     wrote config.toml for cube.obj
     next: affine-atlas build
     ");
-    let built = |id: &str| place("project/affine-atlas-out").join(id).join("atlas.json");
+    let built = |id: &str| {
+        place("project/affine-atlas-out")
+            .join(id)
+            .join("atlas.json")
+    };
     let output = run(&inside, &["build", "--set", "pictures.enabled=false"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert!(built("cube").is_file(), "{}", stderr(&output));
@@ -115,7 +120,12 @@ fn init_then_build_where_meshes_are() {
     wrote project/config.toml for the 2 meshes in and below its folder
     next: affine-atlas build project/config.toml
     ");
-    let again = ["build", "project/config.toml", "--set", "pictures.enabled=false"];
+    let again = [
+        "build",
+        "project/config.toml",
+        "--set",
+        "pictures.enabled=false",
+    ];
     let output = run(folder.path(), &again);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert!(built("more-box").is_file(), "{}", stderr(&output));
@@ -558,7 +568,7 @@ fn explain_names_and_shows_the_faces_at_fault() {
 fn help() {
     let folder = folder();
     insta::assert_snapshot!(stdout(&run(folder.path(), &["-h"])), @r"
-    Turns triangle meshes into affine atlases
+    Unwraps triangle meshes: conformal UVs, affine atlases, geometry images
 
     Usage: affine-atlas [OPTIONS] <COMMAND>
 
@@ -640,7 +650,7 @@ fn help() {
     report.html. It appears when it is complete; an older good folder stays if the build fails. Where
     mesh, settings and version are the same as last time and the folder is whole, nothing is built. OUT
     also gets manifest.jsonl and junit.xml (what became of each mesh), index.html (the same to look at)
-    and logs/NAME.log.
+    and logs/NAME.log. docs/output.md of the source describes every file, key and array.
     ");
     insta::assert_snapshot!(stdout(&run(folder.path(), &["plan", "-h"])), @r"
     Write down what a build would do, for several machines

@@ -57,13 +57,24 @@ fn example() -> Result<String, Failed> {
 /// It runs, looks at every cut edge, and finds the coordinates that are stored there.
 fn seams_close(fixture: &str) -> Result<(), Failed> {
     let folder = tempfile::tempdir()?;
-    let asset = built(&Path::new("fixtures/good").join(fixture), folder.path(), &[])?;
-    let output = Command::new(python()).arg("-c").arg(example()?).arg(&asset).output()?;
+    let asset = built(
+        &Path::new("fixtures/good").join(fixture),
+        folder.path(),
+        &[],
+    )?;
+    let output = Command::new(python())
+        .arg("-c")
+        .arg(example()?)
+        .arg(&asset)
+        .output()?;
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     if !output.status.success() {
         return Err(String::from_utf8_lossy(&output.stderr).into_owned().into());
     }
-    let worst = said.trim().strip_prefix("worst error ").ok_or(said.clone())?;
+    let worst = said
+        .trim()
+        .strip_prefix("worst error ")
+        .ok_or(said.clone())?;
     let worst: f64 = worst.parse()?;
     // Zero would mean that there was nothing to look at.
     match worst > 0.0 && worst < 1e-9 {

@@ -14,7 +14,9 @@ fn root() -> &'static Path {
 fn section(title: &str) -> String {
     let text = std::fs::read_to_string(root().join("docs/output.md")).expect("docs/output.md");
     let start = format!("\n## {title}\n");
-    let (_, after) = text.split_once(&start).unwrap_or_else(|| panic!("no {title}"));
+    let (_, after) = text
+        .split_once(&start)
+        .unwrap_or_else(|| panic!("no {title}"));
     let end = after.find("\n## ").unwrap_or(after.len());
     after[..end].to_owned()
 }
@@ -65,12 +67,7 @@ fn keys_of_schema(schema: &Value, root: &Value, path: &str, keys: &mut BTreeSet<
     keys_of_schema_entries(schema, root, path, keys);
 }
 
-fn keys_of_schema_entries(
-    schema: &Value,
-    root: &Value,
-    path: &str,
-    keys: &mut BTreeSet<String>,
-) {
+fn keys_of_schema_entries(schema: &Value, root: &Value, path: &str, keys: &mut BTreeSet<String>) {
     if schema["items"].is_object() {
         keys_of_schema(&schema["items"], root, &format!("{path}[]"), keys);
     }
@@ -97,7 +94,10 @@ fn assert_same(there: &BTreeSet<String>, described: &BTreeSet<String>, what: &st
     let missing: Vec<_> = there.difference(described).collect();
     let stale: Vec<_> = described.difference(there).collect();
     assert!(missing.is_empty(), "{what} lacks {missing:#?}");
-    assert!(stale.is_empty(), "{what} describes {stale:#?}, which is not there");
+    assert!(
+        stale.is_empty(),
+        "{what} describes {stale:#?}, which is not there"
+    );
 }
 
 fn cube(settings: &[&str]) -> super::command::Built {
@@ -142,7 +142,9 @@ fn every_array_of_atlas_npz_is_described() {
     let names: BTreeSet<String> = found.keys().cloned().collect();
     assert_same(&names, &described(&text), "the section atlas.npz");
     for (name, (dtype, shape)) in &found {
-        let row = text.lines().find(|line| line.starts_with(&format!("| `{name}` |")));
+        let row = text
+            .lines()
+            .find(|line| line.starts_with(&format!("| `{name}` |")));
         let cells: Vec<&str> = row.expect("described").split(" | ").collect();
         let numbers = cells[1].trim_matches(['(', ')']).split(',').map(str::trim);
         let numbers = numbers.filter(|n| !n.is_empty());
@@ -166,7 +168,9 @@ fn every_channel_and_key_of_an_image_is_described() {
     let described = described(&text);
     for image in ["0000.exr", "packed.exr"] {
         let path = atlas.atlas().join("images").join(image);
-        let read = exr::prelude::read().no_deep_data().largest_resolution_level();
+        let read = exr::prelude::read()
+            .no_deep_data()
+            .largest_resolution_level();
         let read = read.all_channels().first_valid_layer().all_attributes();
         let layer = read.from_file(path).expect("an image").layer_data;
         let names = layer.channel_data.list.iter().map(|c| c.name.to_string());
@@ -196,16 +200,27 @@ fn every_attribute_and_key_of_the_glb_is_described() {
     keys_of(&mesh["extras"]["affineAtlas"], "", &mut keys);
     keys_of(&mesh["primitives"][0]["attributes"], "", &mut keys);
     assert!(keys.contains("patches[].rectangle") && keys.contains("POSITION"));
-    let missing: Vec<_> = keys.difference(&described(&section("surface.glb"))).cloned().collect();
+    let missing: Vec<_> = keys
+        .difference(&described(&section("surface.glb")))
+        .cloned()
+        .collect();
     assert!(missing.is_empty(), "{missing:?} not described");
 }
 
 /// README, what lies in `docs`, and the other documents at the top.
 fn documents() -> Vec<PathBuf> {
-    let folders = [root().to_owned(), root().join("docs"), root().join("benches")];
-    let entries = folders.iter().flat_map(|f| std::fs::read_dir(f).expect("a folder"));
+    let folders = [
+        root().to_owned(),
+        root().join("docs"),
+        root().join("benches"),
+    ];
+    let entries = folders
+        .iter()
+        .flat_map(|f| std::fs::read_dir(f).expect("a folder"));
     let paths = entries.map(|entry| entry.expect("readable").path());
-    paths.filter(|path| path.extension().is_some_and(|e| e == "md")).collect()
+    paths
+        .filter(|path| path.extension().is_some_and(|e| e == "md"))
+        .collect()
 }
 
 #[test]
@@ -213,7 +228,11 @@ fn links_in_documents_lead_somewhere() {
     let mut links = 0;
     for path in documents() {
         let text = std::fs::read_to_string(&path).expect("readable");
-        for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+        for link in text
+            .split("](")
+            .skip(1)
+            .filter_map(|rest| rest.split(')').next())
+        {
             let target = link.split('#').next().expect("a first part");
             if target.is_empty() || target.contains("://") {
                 continue;
@@ -233,7 +252,14 @@ fn the_readme_is_short_and_says_what_it_is_for() {
     let words = text.split_whitespace().count();
     assert!(words <= 900, "{words} words");
     let lower = text.to_lowercase();
-    for word in ["uv", "unwrap", "texture coordinates", "blender", "conformal", "cone metric"] {
+    for word in [
+        "uv",
+        "unwrap",
+        "texture coordinates",
+        "blender",
+        "conformal",
+        "cone metric",
+    ] {
         assert!(lower.contains(word), "no word of {word}");
     }
     for command in [
@@ -247,8 +273,13 @@ fn the_readme_is_short_and_says_what_it_is_for() {
     let help = program().arg("--help").output().expect("it runs");
     let help = String::from_utf8(help.stdout).expect("UTF-8");
     let commands = help.split("Commands:").nth(1).expect("commands");
-    let commands = commands.lines().skip(1).take_while(|line| line.starts_with("  "));
-    let named: Vec<&str> = commands.filter_map(|line| line.split_whitespace().next()).collect();
+    let commands = commands
+        .lines()
+        .skip(1)
+        .take_while(|line| line.starts_with("  "));
+    let named: Vec<&str> = commands
+        .filter_map(|line| line.split_whitespace().next())
+        .collect();
     assert!(named.len() > 10, "{named:?}");
     for command in named.iter().filter(|name| **name != "help") {
         let there = text.contains(&format!("affine-atlas {command}"));

@@ -4,6 +4,7 @@ mod arrays;
 mod boundaries;
 mod channels;
 mod command;
+mod dependencies;
 mod documents;
 mod existence;
 mod fit;

@@ -16,7 +16,7 @@ use crate::geometry::ids::NONE;
 use crate::product::AffineAtlas;
 use std::f64::consts::FRAC_PI_2;
 
-/// Version of the output contract that this module writes.
+/// Version of the output format (`docs/format.md`) that this module writes.
 pub const FORMAT_VERSION: u32 = 1;
 
 /// Largest distance from a multiple of π/2 at which a rotation counts as a quarter turn, radians.

@@ -60,9 +60,11 @@ pub(super) fn compare(before: &BTreeMap<String, Past>, assets: &[Asset<'_>]) -> 
     Changes {
         compared,
         of: of.collect(),
-        absent: (before.values().filter(|past| past.latest && !here(&past.id)))
-            .map(|past| past.id.clone())
-            .collect(),
+        absent: (before
+            .values()
+            .filter(|past| past.latest && !here(&past.id)))
+        .map(|past| past.id.clone())
+        .collect(),
     }
 }
 

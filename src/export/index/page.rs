@@ -234,7 +234,9 @@ fn compared(body: &mut String, assets: &[Asset<'_>], changes: &Changes) {
         for (asset, change) in rows {
             let more = match change {
                 Change::NewFailure => format!(": {}", sentence(asset)),
-                Change::Worse(old, new) => format!(": {} → {}", three_digits(old), three_digits(new)),
+                Change::Worse(old, new) => {
+                    format!(": {} → {}", three_digits(old), three_digits(new))
+                }
                 Change::Fixed | Change::New => String::new(),
             };
             let _ = writeln!(body, "<li>{}{more}</li>", linked(asset));
