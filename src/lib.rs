@@ -5,6 +5,8 @@
 //! central chart, boundary charts and node charts, and samples geometry images over injective patches.
 //! It implements the pipeline of Gu, Luo, Yau, *Tutorial on Discrete Ricci Flow for Global
 //! Parameterizations* (section 5.1); equation and section numbers in these docs are the tutorial's.
+//! `docs/method.md` of the source holds what goes beyond it, `docs/format.md` what every output satisfies, and `docs/output.md`
+//! every file, key and array.
 //!
 //! ```text
 //! read → repair → cones → connectivity repair → lengths → Ricci flow → overlay → cut → central chart → charts

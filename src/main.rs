@@ -55,7 +55,11 @@ fn main() -> ExitCode {
 
 fn batch(batch: &Batch<'_>, tasks: &[Task], watcher: &dyn Watcher) -> Recorded {
     let (outcomes, recorded) = batch::run(batch, tasks, watcher);
-    let page = || index::write(batch.output, &Manifest::load(batch.output)?.0);
+    let page = || {
+        let (manifest, _) = Manifest::load(batch.output)?;
+        let ids = tasks.iter().map(|task| task.id.as_str()).collect();
+        index::write(batch.output, &manifest.of(&ids))
+    };
     let recorded = recorded.and_then(|()| page());
     (outcomes, recorded.map_err(failure))
 }
@@ -80,7 +84,9 @@ fn merge(plan: &Plan, merged: &Merged) -> Result<(), Failure> {
         let before = merge::history_before(plan)?;
         merged.save(plan)?;
         let output = &plan.header.output;
-        index::write_against(output, &Manifest::load(output)?.0, &before)?;
+        let (manifest, _) = Manifest::load(output)?;
+        let ids = plan.assets.iter().map(|asset| asset.task.id.as_str());
+        index::write_against(output, &manifest.of(&ids.collect()), &before)?;
         merged.clear_up(plan);
         Ok(())
     };

@@ -28,7 +28,7 @@ pub enum FailureKind {
 }
 
 impl FailureKind {
-    /// The word of the output contract.
+    /// The word of the output format (`docs/format.md`).
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -193,7 +193,7 @@ impl AssetOutcome {
         whole.into_iter().chain(parts)
     }
 
-    /// The word of the output contract: `built`, `cached`, `failed` (also where only a component failed)
+    /// The word of the output format (`docs/format.md`): `built`, `cached`, `failed` (also where only a component failed)
     /// or `cancelled`.
     #[must_use]
     pub fn state_name(&self) -> &'static str {

@@ -55,12 +55,16 @@ fn init_writes_the_commented_configuration_once() {
     let output = run(folder.path(), &["init"]);
     assert!(output.status.success(), "{}", stderr(&output));
     insta::assert_snapshot!(stdout(&output), @r"
-    wrote config.toml
-    list your meshes in `input.paths`, then run: affine-atlas build config.toml
+    wrote config.toml for all meshes in and below its folder, of which there are none yet
+    put meshes there or name them in `input.paths`, then run: affine-atlas build
     ");
     let file = folder.path().join("config.toml");
     let text = std::fs::read_to_string(&file).expect("written");
-    assert_eq!(text, include_str!("../config.toml"));
+    assert_eq!(
+        text,
+        affine_atlas::config::commented_for_its_folder(),
+        "what is written is not what is tested"
+    );
 
     std::fs::write(&file, "# mine").expect("written");
     insta::assert_snapshot!(refusal(folder.path(), &["init"], 2), @r"
@@ -82,6 +86,49 @@ fn init_writes_the_commented_configuration_once() {
         .expect("a folder")
         .collect();
     assert_eq!(left.len(), 1, "a temporary file stayed behind");
+}
+
+/// What `init` writes builds what lies in its folder, one mesh or several, and says so.
+#[test]
+fn init_then_build_where_meshes_are() {
+    let folder = folder();
+    let place = |name: &str| folder.path().join(name);
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures");
+    let cube = fixtures.join("good/genus-0-cube.obj");
+    std::fs::create_dir(place("project")).expect("a folder");
+    std::fs::copy(&cube, place("project/cube.obj")).expect("copied");
+    let inside = place("project");
+    let said = stdout(&run(&inside, &["init"]));
+    insta::assert_snapshot!(said, @r"
+    wrote config.toml for cube.obj
+    next: affine-atlas build
+    ");
+    let built = |id: &str| {
+        place("project/affine-atlas-out")
+            .join(id)
+            .join("atlas.json")
+    };
+    let output = run(&inside, &["build", "--set", "pictures.enabled=false"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(built("cube").is_file(), "{}", stderr(&output));
+
+    // From above, with one more mesh; what was built is no mesh of the folder.
+    std::fs::create_dir(place("project/more")).expect("a folder");
+    std::fs::copy(&cube, place("project/more/box.obj")).expect("copied");
+    let said = stdout(&run(folder.path(), &["init", "project", "--force"]));
+    insta::assert_snapshot!(said, @r"
+    wrote project/config.toml for the 2 meshes in and below its folder
+    next: affine-atlas build project/config.toml
+    ");
+    let again = [
+        "build",
+        "project/config.toml",
+        "--set",
+        "pictures.enabled=false",
+    ];
+    let output = run(folder.path(), &again);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(built("more-box").is_file(), "{}", stderr(&output));
 }
 
 #[cfg(unix)]
@@ -521,7 +568,7 @@ fn explain_names_and_shows_the_faces_at_fault() {
 fn help() {
     let folder = folder();
     insta::assert_snapshot!(stdout(&run(folder.path(), &["-h"])), @r"
-    Turns triangle meshes into affine atlases
+    Unwraps triangle meshes: conformal UVs, affine atlases, geometry images
 
     Usage: affine-atlas [OPTIONS] <COMMAND>
 
@@ -603,7 +650,7 @@ fn help() {
     report.html. It appears when it is complete; an older good folder stays if the build fails. Where
     mesh, settings and version are the same as last time and the folder is whole, nothing is built. OUT
     also gets manifest.jsonl and junit.xml (what became of each mesh), index.html (the same to look at)
-    and logs/NAME.log.
+    and logs/NAME.log. docs/output.md of the source describes every file, key and array.
     ");
     insta::assert_snapshot!(stdout(&run(folder.path(), &["plan", "-h"])), @r"
     Write down what a build would do, for several machines

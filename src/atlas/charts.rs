@@ -6,7 +6,7 @@
 //! faces; what is unfolded are the layout's cells under them, in which they are then placed.
 //!
 //! A boundary chart has two sectors, left and right of its segment, glued along the segment only
-//! (method: a face near both sides is in it twice). A node chart is the ring or fan of one node, a sector for each
+//! (`docs/method.md`, 5: a face near both sides is in it twice). A node chart is the ring or fan of one node, a sector for each
 //! of its copies on the slit disk. No chart is made for interior cones: no planar chart exists there.
 
 use crate::atlas::cut::{CutGraph, Segment};

@@ -15,11 +15,11 @@ Exit codes:
     4  an error of this program
   130  stopped by Ctrl-C or SIGTERM";
 
-/// Turns triangle meshes into affine atlases.
+/// Unwraps triangle meshes: conformal UVs, affine atlases, geometry images.
 ///
 /// An affine atlas covers the surface with flat charts whose transitions are rotations and
-/// translations. It is computed by discrete Ricci flow and written as NumPy arrays, geometry
-/// images (EXR) and a textured GLB.
+/// translations. It is computed by discrete Ricci flow and written as a GLB with texture
+/// coordinates, NumPy arrays and geometry images (EXR).
 #[derive(Debug, Parser)]
 #[command(name = "affine-atlas", version, after_help = EXIT_CODES, after_long_help = EXIT_CODES)]
 pub struct Arguments {
@@ -138,7 +138,7 @@ Each mesh becomes a folder OUT/NAME with atlas.json, atlas.npz, surface.glb, ima
 report.html. It appears when it is complete; an older good folder stays if the build fails. Where
 mesh, settings and version are the same as last time and the folder is whole, nothing is built. OUT
 also gets manifest.jsonl and junit.xml (what became of each mesh), index.html (the same to look at)
-and logs/NAME.log.";
+and logs/NAME.log. docs/output.md of the source describes every file, key and array.";
 
 const PLAN_EXAMPLES: &str = "\
 Examples:
@@ -240,8 +240,8 @@ It appears when it is complete.";
 
 const INIT_EXAMPLES: &str = "\
 Examples:
-  affine-atlas init                   writes ./config.toml
-  affine-atlas init settings/my.toml";
+  affine-atlas init                   writes ./config.toml for the meshes in and below this folder
+  affine-atlas init settings/my.toml  for those in and below settings";
 
 /// Meshes and settings.
 #[derive(Debug, Args)]

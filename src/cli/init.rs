@@ -3,9 +3,10 @@
 use super::arguments::{Global, Init};
 use super::problem::Problem;
 use super::{exit, terminal};
-use affine_atlas::config::COMMENTED_DEFAULT;
+use affine_atlas::batch::inputs;
+use affine_atlas::config::{Config, commented_for_its_folder};
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Writes the commented configuration.
 pub fn run(init: &Init, global: &Global) -> Result<u8, Problem> {
@@ -16,12 +17,43 @@ pub fn run(init: &Init, global: &Global) -> Result<u8, Problem> {
     };
     write(&path, init.force)?;
     if !global.quiet {
-        terminal::print(&format!(
-            "wrote {0}\nlist your meshes in `input.paths`, then run: affine-atlas build {0}\n",
-            path.display()
-        ));
+        terminal::print(&said(&path));
     }
     Ok(exit::GOOD)
+}
+
+/// Which meshes the configuration stands for, and what to do next.
+fn said(path: &Path) -> String {
+    let output = folder_of(path).join(Config::default().output.folder);
+    let found = inputs::expand(&[PathBuf::from(".")], folder_of(path), &output);
+    let found = found.map(|found| found.files).unwrap_or_default();
+    let (which, first) = match &found[..] {
+        [] => (
+            "all meshes in and below its folder, of which there are none yet".to_owned(),
+            "put meshes there or name them in `input.paths`, then run",
+        ),
+        [only] => {
+            let mesh = only.path.strip_prefix(folder_of(path));
+            let mesh = mesh.unwrap_or(&only.path);
+            (mesh.display().to_string(), "next")
+        }
+        several => (
+            format!("the {} meshes in and below its folder", several.len()),
+            "next",
+        ),
+    };
+    let command = match path == Path::new("config.toml") {
+        true => "affine-atlas build".to_owned(),
+        false => format!("affine-atlas build {}", path.display()),
+    };
+    format!("wrote {} for {which}\n{first}: {command}\n", path.display())
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
 }
 
 /// The file appears complete or not at all.
@@ -30,10 +62,7 @@ fn write(path: &Path, force: bool) -> Result<(), Problem> {
         path: path.to_owned(),
         reason: reason.kind().to_string(),
     };
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
+    let folder = folder_of(path);
     if !force && path.exists() {
         return Err(Problem::Exists {
             path: path.to_owned(),
@@ -46,7 +75,7 @@ fn write(path: &Path, force: bool) -> Result<(), Problem> {
         });
     }
     let mut file = builder().tempfile_in(folder).map_err(not_written)?;
-    file.write_all(COMMENTED_DEFAULT.as_bytes())
+    file.write_all(commented_for_its_folder().as_bytes())
         .map_err(not_written)?;
     if force {
         file.persist(path)

@@ -33,7 +33,7 @@ use problem::Problem;
 use std::process::ExitCode;
 use work::Work;
 
-/// Exit codes of the output contract.
+/// Exit codes of the output format (`docs/format.md`).
 mod exit {
     /// All good.
     pub const GOOD: u8 = 0;

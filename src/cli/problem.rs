@@ -61,7 +61,7 @@ pub enum Problem {
 }
 
 impl Problem {
-    /// Exit code of the output contract.
+    /// Exit code of the output format (`docs/format.md`).
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::NoInputs | Self::NothingFound { .. } => exit::NOTHING_TO_DO,

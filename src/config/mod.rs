@@ -30,9 +30,19 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// The commented configuration that `affine-atlas init` writes. It parses to
-/// [`Config::default`] but for `input.paths`.
+/// The commented configuration of this repository. It parses to [`Config::default`] but for `input.paths`, which names a fixture.
 pub const COMMENTED_DEFAULT: &str = include_str!("../../config.toml");
+
+/// The commented configuration that `affine-atlas init` writes: its `input.paths` stands for all meshes in and below its own folder, however
+/// many there are.
+#[must_use]
+pub fn commented_for_its_folder() -> String {
+    let lines = COMMENTED_DEFAULT.lines().map(|line| {
+        let is_paths = line.starts_with("paths = ");
+        if is_paths { "paths = [\".\"]" } else { line }
+    });
+    lines.flat_map(|line| [line, "\n"]).collect()
+}
 
 /// Everything that a run needs to know beside the meshes themselves.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

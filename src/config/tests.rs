@@ -63,6 +63,19 @@ fn commented_default_is_the_default() {
     assert_eq!(parse("empty", "", &[]).expect("parses"), Config::default());
 }
 
+/// What `init` writes differs from the configuration of this repository by the meshes alone.
+#[test]
+fn the_configuration_for_a_folder_names_the_folder() {
+    let text = commented_for_its_folder();
+    let mut config = parse("config.toml", &text, &[]).expect("parses");
+    assert_eq!(config.input.paths, [PathBuf::from(".")]);
+    config.input.paths.clear();
+    assert_eq!(config, Config::default());
+    let lines = text.lines().zip(COMMENTED_DEFAULT.lines());
+    assert_eq!(lines.filter(|(own, other)| own != other).count(), 1);
+    assert_eq!(text.lines().count(), COMMENTED_DEFAULT.lines().count());
+}
+
 #[test]
 fn key_table_default_and_commented_default_have_the_same_keys() {
     let known: BTreeSet<String> = top_level_keys()

@@ -31,7 +31,7 @@ pub const ATTRIBUTE: &str = "affineAtlas";
 pub struct Label {
     /// `"affine-atlas"`.
     pub format: String,
-    /// Version of the output contract.
+    /// Version of the output format (`docs/format.md`).
     pub version: u32,
     /// Name of the asset.
     pub asset: String,
@@ -86,7 +86,7 @@ impl Label {
 pub struct PackedLabel {
     /// `"affine-atlas"`.
     pub format: String,
-    /// Version of the output contract.
+    /// Version of the output format (`docs/format.md`).
     pub version: u32,
     /// Name of the asset.
     pub asset: String,

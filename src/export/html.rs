@@ -65,14 +65,41 @@ pub(super) fn figure(x: f64) -> String {
     }
 }
 
-/// A page: `head` and `body` are markup already, `title` is text.
-pub(super) fn page(title: &str, style: &str, body: &str, scripts: &[&str]) -> String {
+/// Where the pictures of a page come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Pictures {
+    /// From the page itself.
+    Inside,
+    /// From files below the page's folder too.
+    Beside,
+}
+
+impl Pictures {
+    /// As the policy has it. A page that is opened from disk has no origin of its own that all browsers agree on, hence `file:`.
+    fn sources(self) -> &'static str {
+        match self {
+            Self::Inside => "data:",
+            Self::Beside => "data: 'self' file:",
+        }
+    }
+}
+
+/// A page: `body` is markup already, `title` is text.
+pub(super) fn page(
+    title: &str,
+    style: &str,
+    body: &str,
+    scripts: &[&str],
+    pictures: Pictures,
+) -> String {
     let mut out = String::with_capacity(body.len() + 64 * 1024);
     out.push_str("<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
-    out.push_str(
+    let _ = write!(
+        out,
         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src {}\">\n\
          <link rel=\"icon\" href=\"data:,\">\n",
+        pictures.sources()
     );
     let _ = write!(
         out,
@@ -105,7 +132,7 @@ mod tests {
             link("a b/javascript:x%\"<.html"),
             "./a%20b/javascript%3Ax%25%22%3C.html"
         );
-        assert!(page(hostile, "", "", &[]).contains("<title>&lt;/script&gt;"));
+        assert!(page(hostile, "", "", &[], Pictures::Inside).contains("<title>&lt;/script&gt;"));
     }
 
     #[test]

@@ -6,7 +6,7 @@
 use crate::export::{Action, ExportError, folder, names};
 use crate::outcome::{AssetOutcome, AssetState, FailureKind};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::Path;
@@ -147,6 +147,13 @@ impl Manifest {
             record.seconds = 0.0;
         }
         self.records.insert(record.id.clone(), record);
+    }
+
+    /// The records of these assets alone.
+    #[must_use]
+    pub fn of(mut self, ids: &BTreeSet<&str>) -> Self {
+        self.records.retain(|id, _| ids.contains(id.as_str()));
+        self
     }
 
     /// The record of an asset.

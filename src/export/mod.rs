@@ -1,4 +1,4 @@
-//! Writing what a job built: the folder of one asset as the output contract describes it.
+//! Writing what a job built: the folder of one asset as the output format (`docs/format.md`) describes it.
 //!
 //! *Enters:* an [`AffineAtlas`] and its [`Provenance`]. *Leaves:* `atlas.json`, `atlas.npz`,
 //! `surface.glb`, `images/PPPP.exr` and, where it is asked for, `images/packed.exr` in a [`folder::Staging`] folder, which replaces the older

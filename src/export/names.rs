@@ -8,6 +8,8 @@ pub(super) const INDEX: &str = "index.html";
 pub(super) const HISTORY: &str = "history.jsonl";
 /// The record of the latest run.
 pub(super) const MANIFEST: &str = "manifest.jsonl";
+/// The picture that stands for a component.
+pub(super) const PREVIEW: &str = "preview.png";
 /// The page of a component.
 pub(super) const REPORT: &str = "report.html";
 

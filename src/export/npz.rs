@@ -1,7 +1,7 @@
 //! `atlas.npz`: all arrays in full precision, a zip archive of NumPy arrays.
 //!
 //! Entries carry the fixed date 1980-01-01 and stand in the order of the contract, so equal atlases
-//! give equal bytes. Element types and shapes are those of the contract: `<f8`, `<u4` and `|u1`, C order.
+//! give equal bytes. Element types and shapes are those of the format: `<f8`, `<u4` and `|u1`, C order.
 
 use crate::atlas::charts::ChartFace;
 use crate::export::EncodeError;

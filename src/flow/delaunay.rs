@@ -1,4 +1,4 @@
-//! The triangulation that is flipped until it is Delaunay, at any scale `u` (method 2, "Flips").
+//! The triangulation that is flipped until it is Delaunay, at any scale `u` (`docs/method.md`, 2, "Flips").
 //!
 //! *Enters:* a closed triangulation with lengths, then one `u` after another. *Leaves:* the Delaunay triangulation of the lengths
 //! e^{(u_i + u_j)/2} l⁰, with the shapes of its faces. Lengths are logarithms (Penner coordinates): flips by Ptolemy's

@@ -4,7 +4,7 @@
 //! with the same ids. *Guaranteed:* faces of the mirror image run the other way, so the double is oriented.
 //!
 //! Curvature at a boundary vertex is twice the surface's own, and a flat metric that is symmetric has the old boundary as straight
-//! lines: a boundary condition becomes none (method 2).
+//! lines: a boundary condition becomes none (`docs/method.md`, 2).
 
 use crate::geometry::connectivity::{Connectivity, ConnectivityError};
 use crate::geometry::ids::{EdgeVec, HalfedgeId, HalfedgeVec, VertexId, VertexVec};

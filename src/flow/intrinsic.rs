@@ -1,4 +1,4 @@
-//! The three triangulations of the flow with flips (method 2): A, the base mesh; B, the intrinsic Delaunay
+//! The three triangulations of the flow with flips (`docs/method.md`, 2): A, the base mesh; B, the intrinsic Delaunay
 //! triangulation of its lengths; C, the final one. They share their vertices.
 //!
 //! *Enters:* what the flow found. *Leaves:* a value that the overlay is made from. A surface with boundary is doubled:

@@ -42,7 +42,10 @@ impl Frame {
             true => exponent_of(half) + 1,
             false => 0,
         };
-        let reach = low.iter().chain(&high).fold(0.0, |m: f64, x| m.max(x.abs()));
+        let reach = low
+            .iter()
+            .chain(&high)
+            .fold(0.0, |m: f64, x| m.max(x.abs()));
         Self {
             origin: std::array::from_fn(|i| far_middle(low[i], high[i])),
             exponent,
@@ -146,7 +149,9 @@ mod tests {
         let mut points = Vec::new();
         let mut state = 7u64;
         let mut random = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
             (state >> 11) as f64 / (1u64 << 53) as f64
         };
         for _ in 0..500 {
@@ -157,7 +162,12 @@ mod tests {
 
     #[test]
     fn positions_come_back_bit_for_bit() {
-        for offset in [[0.0; 3], [1e3, -7.0, 0.3], [-1e12, 5e4, -0.5], [0.9, 1.1, 2.0]] {
+        for offset in [
+            [0.0; 3],
+            [1e3, -7.0, 0.3],
+            [-1e12, 5e4, -0.5],
+            [0.9, 1.1, 2.0],
+        ] {
             for size in [1e-30, 1.0, 3.7e5] {
                 let points = box_at(offset, size);
                 let frame = Frame::of(&points);
@@ -180,20 +190,29 @@ mod tests {
         }
         let far = [[f64::MAX, 0.0, 0.0], [-f64::MAX, 1.0, 0.0]];
         let entered = far.map(|p| Frame::of(&far).enter(p));
-        assert!(entered.iter().flatten().all(|x| x.abs() <= 2.0), "{entered:?}");
+        assert!(
+            entered.iter().flatten().all(|x| x.abs() <= 2.0),
+            "{entered:?}"
+        );
     }
 
     #[test]
     fn multiples_by_powers_of_two_enter_with_the_same_bits() {
         let points = box_at([5.0, -1e3, 0.0], 1.0);
-        let entered: Vec<_> = points.iter().map(|&p| Frame::of(&points).enter(p)).collect();
+        let entered: Vec<_> = points
+            .iter()
+            .map(|&p| Frame::of(&points).enter(p))
+            .collect();
         for k in [-900, -100, -1, 1, 64, 900] {
             let times = |p: [f64; 3]| p.map(|x| times_power_of_two(x, k));
             let scaled: Vec<_> = points.iter().map(|&p| times(p)).collect();
             let frame = Frame::of(&scaled);
             let again: Vec<_> = scaled.iter().map(|&p| frame.enter(p)).collect();
             assert_eq!(again, entered, "2^{k}");
-            assert_eq!(frame.length(1.0), times_power_of_two(Frame::of(&points).length(1.0), k));
+            assert_eq!(
+                frame.length(1.0),
+                times_power_of_two(Frame::of(&points).length(1.0), k)
+            );
         }
     }
 
@@ -202,11 +221,17 @@ mod tests {
         assert_eq!(times_power_of_two(1.5, 0), 1.5);
         assert_eq!(times_power_of_two(1.0, -1074), f64::from_bits(1));
         assert_eq!(times_power_of_two(f64::from_bits(1), 1074), 1.0);
-        assert_eq!(times_power_of_two(f64::from_bits(1), 2000), times_power_of_two(1.0, 926));
+        assert_eq!(
+            times_power_of_two(f64::from_bits(1), 2000),
+            times_power_of_two(1.0, 926)
+        );
         assert_eq!(times_power_of_two(1.0, -1100), 0.0);
         assert_eq!(times_power_of_two(1.0, 1100), f64::INFINITY);
         // A number of 53 bits is rounded once, to even.
         let x = 1.0 + f64::EPSILON;
-        assert_eq!(times_power_of_two(x, -1022), f64::MIN_POSITIVE + f64::from_bits(1));
+        assert_eq!(
+            times_power_of_two(x, -1022),
+            f64::MIN_POSITIVE + f64::from_bits(1)
+        );
     }
 }

@@ -12,11 +12,24 @@ impl AffineAtlas {
         let length = |l: &mut f64| *l = frame.length(*l);
         let motion = |m: &mut RigidMotion| m.translation = frame.plane(m.translation);
         frame.leave_all(&mut self.mesh.positions);
-        self.metric.length.as_mut_slice().iter_mut().for_each(length);
-        self.central.uv.as_mut_slice().as_flattened_mut().iter_mut().for_each(plane);
+        self.metric
+            .length
+            .as_mut_slice()
+            .iter_mut()
+            .for_each(length);
+        self.central
+            .uv
+            .as_mut_slice()
+            .as_flattened_mut()
+            .iter_mut()
+            .for_each(plane);
         length(&mut self.central.closing_error);
         for chart in &mut self.charts.charts {
-            chart.faces.iter_mut().flat_map(|f| &mut f.uv).for_each(plane);
+            chart
+                .faces
+                .iter_mut()
+                .flat_map(|f| &mut f.uv)
+                .for_each(plane);
         }
         for transition in &mut self.charts.transitions {
             motion(&mut transition.motion);
@@ -26,7 +39,12 @@ impl AffineAtlas {
             motion(&mut gluing.motion);
             length(&mut gluing.residual);
         }
-        self.patches.uv.as_mut_slice().as_flattened_mut().iter_mut().for_each(plane);
+        self.patches
+            .uv
+            .as_mut_slice()
+            .as_flattened_mut()
+            .iter_mut()
+            .for_each(plane);
         for patch in &mut self.patches.patches {
             patch.texel_to_patch.iter_mut().flatten().for_each(length);
             patch.packed_scale /= frame.length(1.0);

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 /// Largest `atlas.json` that is read (bytes).
 const JSON_LIMIT: u64 = 1 << 30;
-/// Version of the output contract that is understood.
+/// Version of the output format (`docs/format.md`) that is understood.
 const VERSION: u64 = 1;
 
 /// The number that stands for the surface's boundary in `seam_patch`.

@@ -1,4 +1,4 @@
-//! Geometry images: `images/PPPP.exr` as the output contract has them.
+//! Geometry images: `images/PPPP.exr` as the output format (`docs/format.md`) has them.
 //!
 //! *Guaranteed:* whatever the file holds nothing panics, and memory is bounded by the size that the caller states
 //! and the bytes of the file.
@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// Largest image file that is read (bytes).
 const SIZE_LIMIT: u64 = 1 << 32;
-/// No lossless compression of the contract makes data smaller than this; an image that claims more texels
+/// No lossless compression of the format makes data smaller than this; an image that claims more texels
 /// than its file can hold is refused before anything is allocated for it.
 const BEST_COMPRESSION: u64 = 1100;
 
@@ -37,7 +37,7 @@ pub(crate) enum Read {
     /// An image of the size that was stated.
     Image {
         image: Box<Image>,
-        /// What of its layout is not as the contract has it.
+        /// What of its layout is not as the format has it.
         layout: Option<String>,
     },
 }
@@ -59,7 +59,7 @@ pub(crate) fn numbers(samples: FlatSamples) -> Option<Vec<f32>> {
     }
 }
 
-/// The image, and what of its layout is not as the contract has it.
+/// The image, and what of its layout is not as the format has it.
 fn decode(bytes: &[u8], [width, height]: [usize; 2]) -> Result<Read, String> {
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false)
         .map_err(|error| error.to_string())?;

@@ -1,6 +1,6 @@
 //! A bounded reader of `.npz`: a zip container of NumPy arrays.
 //!
-//! Only what the output contract uses: little-endian f64 and u32, u8, C order. The header's shape must agree
+//! Only what the output format (`docs/format.md`) uses: little-endian f64 and u32, u8, C order. The header's shape must agree
 //! with the entry's size before anything is read, and memory grows only with data that is really there.
 
 use std::fs::File;
@@ -11,7 +11,7 @@ use zip::ZipArchive;
 /// Longest header that is read (NumPy writes less than 200 bytes for arrays like ours).
 const HEADER_LIMIT: usize = 1 << 16;
 
-/// A number type of the contract.
+/// A number type of the format.
 pub(crate) trait Element: Copy {
     /// NumPy's names for it.
     const DESCR: &'static [&'static str];

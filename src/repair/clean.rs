@@ -185,7 +185,11 @@ fn edge(a: u32, b: u32) -> (u32, u32) {
 
 /// Takes out collinear faces as the module docs show, lowest first. A face that is split may become
 /// collinear itself and wait in turn; the number of rounds is bounded, and what is left then stays.
-fn take_out_collinear(faces: &mut Vec<DraftFace>, positions: &[[f64; 3]], changes: &mut Vec<Change>) {
+fn take_out_collinear(
+    faces: &mut Vec<DraftFace>,
+    positions: &[[f64; 3]],
+    changes: &mut Vec<Change>,
+) {
     let mut slots: Vec<Option<DraftFace>> = faces.drain(..).map(Some).collect();
     let mut at_edge: HashMap<(u32, u32), BTreeSet<usize>> = HashMap::new();
     let mut waiting = BTreeSet::new();

@@ -78,7 +78,7 @@ pub(super) struct Document {
 }
 
 impl Document {
-    /// Whether a program wrote it, which must then keep the whole contract.
+    /// Whether a program wrote it, which must then keep the whole format (`docs/format.md`).
     pub fn is_generated(&self) -> bool {
         self.generator.is_some()
     }

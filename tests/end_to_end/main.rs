@@ -4,6 +4,8 @@ mod arrays;
 mod boundaries;
 mod channels;
 mod command;
+mod dependencies;
+mod documents;
 mod existence;
 mod fit;
 mod flows;

@@ -3,7 +3,7 @@
 //! *Enters:* the final triangulation of the flow and the overlay. *Leaves:* a triangulation with well-shaped flat faces, whose
 //! vertices are the first vertices of the overlay, and for every overlay corner a *carrier*: a layout halfedge of its
 //! own cell and the fraction along it where the corner lies. So overlay faces are placed, never developed: slivers would lose
-//! the result (method 6).
+//! the result (`docs/method.md`, 6).
 //!
 //! A *cell* is a convex flat polygon of one or more layout faces: a face of the final triangulation, or where the
 //! mirror of a doubled surface passes through it, a part of one. Every overlay face lies in one cell.

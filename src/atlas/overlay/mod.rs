@@ -1,4 +1,4 @@
-//! The overlay: the common refinement of the base mesh and the final triangulation of the flow (method 2, "Flips").
+//! The overlay: the common refinement of the base mesh and the final triangulation of the flow (`docs/method.md`, 2, "Flips").
 //!
 //! *Enters:* a mesh and its flat metric, which where the flow flipped lives on another triangulation. *Leaves:* a mesh
 //! whose every face lies in one face of both, so that it carries positions *and* flat lengths, and the [`Layout`] that is cut

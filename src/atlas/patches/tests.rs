@@ -52,7 +52,12 @@ fn check(s: &Sample, params: &PatchParams) -> Checked {
         params,
     )
     .unwrap();
-    let images = sample(&s.mesh, &layout, &s.log_scale, image_origin(&s.mesh, &crate::geometry::frame::Frame::default()));
+    let images = sample(
+        &s.mesh,
+        &layout,
+        &s.log_scale,
+        image_origin(&s.mesh, &crate::geometry::frame::Frame::default()),
+    );
     let mut faces = vec![Vec::new(); layout.patches.len()];
     for (f, p) in layout.face_patch.enumerate() {
         faces[p.index()].push(f);

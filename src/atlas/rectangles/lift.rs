@@ -2,7 +2,7 @@
 //!
 //! *Enters:* a surface with metric, cut and charts, and a subdivision. *Leaves:* the same on the finer faces. *Guaranteed:* the same
 //! surface, the same flat metric, the same charts and transitions: only faces are divided. Flat lengths come from differences of weights
-//! in the face that they lie in, so small faces keep their relative accuracy (method 6), and pieces of an edge add up to it.
+//! in the face that they lie in, so small faces keep their relative accuracy (`docs/method.md`, 6), and pieces of an edge add up to it.
 
 use super::Charted;
 use super::subdivision::Subdivision;

@@ -24,6 +24,7 @@ impl Asset<'_> {
             input_hash: self.record.input_hash.clone(),
             config_hash: self.record.config_hash.clone(),
             figures: self.figures.clone(),
+            latest: true,
         }
     }
 }

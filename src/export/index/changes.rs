@@ -19,7 +19,7 @@ pub(super) enum Change {
     Fixed,
     /// Its area distortion grew from the first to the second number.
     Worse(f64, f64),
-    /// It was not there.
+    /// No run before had it.
     New,
 }
 
@@ -41,8 +41,8 @@ pub(super) struct Changes {
     pub compared: bool,
     /// By asset, as many as there are assets.
     pub of: Vec<Option<Change>>,
-    /// Assets that were there.
-    pub removed: Vec<String>,
+    /// Assets that the run before had, and this one has not.
+    pub absent: Vec<String>,
 }
 
 /// Compares; `assets` stand in order of their ids.
@@ -60,7 +60,11 @@ pub(super) fn compare(before: &BTreeMap<String, Past>, assets: &[Asset<'_>]) -> 
     Changes {
         compared,
         of: of.collect(),
-        removed: before.keys().filter(|&id| !here(id)).cloned().collect(),
+        absent: (before
+            .values()
+            .filter(|past| past.latest && !here(&past.id)))
+        .map(|past| past.id.clone())
+        .collect(),
     }
 }
 

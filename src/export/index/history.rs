@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::{fs, io};
 
-/// An asset at the end of a run.
+/// An asset as a run left it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Past {
     /// Its id.
@@ -21,9 +21,12 @@ pub(super) struct Past {
     pub config_hash: String,
     /// Figures of its atlases, where there are any.
     pub figures: Option<Figures>,
+    /// Whether that run was the latest one. Assets that a run has nothing to do with stay as they are, so that a run of one asset does not make
+    /// all others new to the next run of all.
+    pub latest: bool,
 }
 
-/// The run before; nothing where there was none. Lines that are no records, such as those of another version, count as not there.
+/// What earlier runs left; nothing where there was none. Lines that are no records, such as those of another version, count as not there.
 pub(super) fn load(path: &Path) -> Result<BTreeMap<String, Past>, ExportError> {
     let bytes = match fs::read(path) {
         Ok(bytes) => bytes,
@@ -35,11 +38,19 @@ pub(super) fn load(path: &Path) -> Result<BTreeMap<String, Past>, ExportError> {
     Ok(known.map(|past| (past.id.clone(), past)).collect())
 }
 
-/// The text of the file.
-pub(super) fn to_text(assets: impl Iterator<Item = Past>) -> String {
+/// The text of the file: the assets of this run, and of those before what this run had nothing to do with.
+pub(super) fn to_text(
+    before: BTreeMap<String, Past>,
+    assets: impl Iterator<Item = Past>,
+) -> String {
+    let mut all = before;
+    for past in all.values_mut() {
+        past.latest = false;
+    }
+    all.extend(assets.map(|past| (past.id.clone(), past)));
     let mut text = String::new();
-    for past in assets {
-        let line = serde_json::to_string(&past)
+    for past in all.values() {
+        let line = serde_json::to_string(past)
             .expect("string keys and no custom serialiser, so that serialisation cannot fail");
         text.push_str(&line);
         text.push('\n');

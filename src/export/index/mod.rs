@@ -1,7 +1,7 @@
 //! `index.html`: what a run over many assets came to, for the person who looks at it in the morning.
 //!
-//! *Enters:* the manifest of an output root, the `atlas.json` of its assets, and the history of the run before. *Leaves:* one page
-//! that needs no network, with links to folders and reports, and the history for the next run.
+//! *Enters:* the records of a run's assets, their `atlas.json`, and the history of the runs before. *Leaves:* one page
+//! that needs no network, with links to folders and reports and the previews of the assets, and the history for the next run.
 //!
 //! *Guaranteed:* nothing but the manifest's figures and those of `atlas.json`; both files are replaced in one step each; names and messages
 //! are text, whatever they hold. Like the manifest it holds times.
@@ -25,7 +25,7 @@ pub const FILE_NAME: &str = names::INDEX;
 /// Name of what the next run compares with.
 pub const HISTORY_NAME: &str = names::HISTORY;
 
-/// Writes the page of a run that has ended and whose manifest is `current`.
+/// Writes the page of a run that has ended; `current` holds the records of its assets and no others.
 ///
 /// It compares with the run before by `history.jsonl`, which this replaces: call it once at the end of a run.
 pub fn write(output_root: &Path, current: &Manifest) -> Result<(), ExportError> {
@@ -43,7 +43,7 @@ pub fn write_against(
     let changes = changes::compare(&before, &assets);
     let text = page::page(&assets, &changes);
     write_file_atomically(&output_root.join(FILE_NAME), text.as_bytes())?;
-    let lines = history::to_text(assets.iter().map(Asset::past));
+    let lines = history::to_text(before, assets.iter().map(Asset::past));
     write_file_atomically(&output_root.join(HISTORY_NAME), lines.as_bytes())
 }
 

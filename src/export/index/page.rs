@@ -2,7 +2,7 @@
 
 use super::assets::Asset;
 use super::changes::{Change, Changes, WORSE_BY, WORSE_FACTOR};
-use crate::export::html::{self, escape, figure, link};
+use crate::export::html::{self, Pictures, escape, link};
 use crate::export::manifest::State;
 use crate::export::names::{self, component_name};
 use std::fmt::Write as _;
@@ -47,7 +47,13 @@ pub(super) fn page(assets: &[Asset<'_>], changes: &Changes) -> String {
         body,
         "<p class=\"soft\">Written by {version} from manifest.jsonl and the atlas.json of each asset.</p>"
     );
-    html::page("Atlases", STYLE, &body, &[html::TABLES, SCRIPT])
+    html::page(
+        "Atlases",
+        STYLE,
+        &body,
+        &[html::TABLES, SCRIPT],
+        Pictures::Beside,
+    )
 }
 
 fn counts(body: &mut String, assets: &[Asset<'_>]) {
@@ -79,9 +85,67 @@ fn counts(body: &mut String, assets: &[Asset<'_>]) {
 pub(super) fn duration(seconds: f64) -> String {
     let whole = seconds.clamp(0.0, 1e12).round() as u64;
     match (whole / 3600, whole / 60 % 60) {
+        (0, 0) if seconds < 10.0 => format!("{seconds:.2} s"),
         (0, 0) => format!("{seconds:.1} s"),
         (0, minutes) => format!("{minutes} min {} s", whole % 60),
         (hours, minutes) => format!("{hours} h {minutes} min"),
+    }
+}
+
+/// A number with three digits, and a power of ten where it is very large or small.
+pub(super) fn three_digits(x: f64) -> String {
+    let size = x.abs();
+    if x == 0.0 {
+        "0".to_owned()
+    } else if !x.is_finite() || !(1e-3..1e5).contains(&size) {
+        format!("{x:.2e}")
+    } else {
+        let digits = (2 - size.log10().floor() as i32).clamp(0, 5) as usize;
+        format!("{x:.digits$}")
+    }
+}
+
+/// A count with its thousands apart.
+pub(super) fn count(x: f64) -> String {
+    let digits = format!("{x:.0}");
+    let mut out = String::with_capacity(digits.len() + digits.len() / 3 * 3);
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push('\u{202f}');
+        }
+        out.push(digit);
+    }
+    out
+}
+
+/// Bytes as people say them.
+pub(super) fn memory(bytes: f64) -> String {
+    match bytes {
+        b if b < 1e6 => format!("{:.0} kB", b / 1e3),
+        b if b < 1e9 => format!("{:.0} MB", b / 1e6),
+        b => format!("{:.1} GB", b / 1e9),
+    }
+}
+
+/// An angle in radians as people say it.
+pub(super) fn angle(radians: f64) -> String {
+    format!("{}°", three_digits(radians.to_degrees()))
+}
+
+/// The picture of an asset that was built: that of its first component, if pictures were drawn. The browser fetches it when it comes into view.
+fn thumbnail(asset: &Asset<'_>) -> String {
+    let record = asset.record;
+    if !matches!(record.state, State::Built | State::Cached) {
+        return String::new();
+    }
+    let ending = format!("/{}", names::PREVIEW);
+    let inside = |file: &&String| file.ends_with(&ending) && !file.split('/').any(|p| p == "..");
+    match record.files.iter().find(inside) {
+        Some(file) => format!(
+            "<img src=\"{}\" alt=\"\" width=\"64\" height=\"64\" loading=\"lazy\" decoding=\"async\">",
+            link(file)
+        ),
+        None => String::new(),
     }
 }
 
@@ -169,21 +233,23 @@ fn compared(body: &mut String, assets: &[Asset<'_>], changes: &Changes) {
         for (asset, change) in rows {
             let more = match change {
                 Change::NewFailure => format!(": {}", sentence(asset)),
-                Change::Worse(old, new) => format!(": {} → {}", figure(old), figure(new)),
+                Change::Worse(old, new) => {
+                    format!(": {} → {}", three_digits(old), three_digits(new))
+                }
                 Change::Fixed | Change::New => String::new(),
             };
             let _ = writeln!(body, "<li>{}{more}</li>", linked(asset));
         }
         body.push_str("</ul></details>\n");
     }
-    if !changes.removed.is_empty() {
+    if !changes.absent.is_empty() {
         any = true;
         let _ = writeln!(
             body,
-            "<details class=\"change\"><summary><b>{}</b> Removed</summary><ul>",
-            changes.removed.len()
+            "<details class=\"change\"><summary><b>{}</b> Not in this run</summary><ul>",
+            changes.absent.len()
         );
-        for id in &changes.removed {
+        for id in &changes.absent {
             let _ = writeln!(body, "<li>{}</li>", escape(id));
         }
         body.push_str("</ul></details>\n");
@@ -221,47 +287,67 @@ fn leading(body: &mut String, assets: &[Asset<'_>]) {
         .filter_map(|a| Some((a, a.figures.as_ref()?.area_distortion)))
         .collect();
     body.push_str("<div class=\"leading\">\n");
-    for (title, unit, rows) in [
-        ("Slowest", " s", &mut slowest),
-        ("Worst area distortion", "", &mut worst),
+    type Words = fn(f64) -> String;
+    for (title, words, rows) in [
+        ("Slowest", duration as Words, &mut slowest),
+        ("Worst area distortion", three_digits, &mut worst),
     ] {
         rows.sort_by(|a, b| b.1.total_cmp(&a.1));
         let _ = write!(body, "<section><h2>{title}</h2>\n<ol>\n");
         for (asset, value) in rows.iter().take(LEADING) {
-            let _ = writeln!(body, "<li>{}: {}{unit}</li>", linked(asset), figure(*value));
+            let _ = writeln!(body, "<li>{}: {}</li>", linked(asset), words(*value));
         }
         body.push_str("</ol></section>\n");
     }
     body.push_str("</div>\n");
 }
 
+/// Columns of the table: head, whether it holds numbers, and what these are.
+const HEADS: [(&str, bool, &str); 15] = [
+    ("asset", false, "links to its folder and its reports"),
+    ("state", false, "what became of it in this run"),
+    ("change", false, "against the runs before"),
+    ("time", true, "wall time of its build"),
+    ("memory", true, "most memory that its process took"),
+    ("faces", true, "faces of the surface in atlas.npz"),
+    ("genus", true, "handles of all components"),
+    ("loops", true, "boundary loops of all components"),
+    ("cones", true, "vertices of prescribed curvature"),
+    ("patches", true, "geometry images"),
+    (
+        "area distortion",
+        true,
+        "(9) of the tutorial, the worst component; 0 is none",
+    ),
+    (
+        "log scale",
+        true,
+        "standard deviation of the logarithm of the length scale, the worst component; 0 is none",
+    ),
+    (
+        "angle error",
+        true,
+        "mean difference of corner angles, the worst component",
+    ),
+    (
+        "images",
+        true,
+        "PSNR of the surface rebuilt from the images, the worst component",
+    ),
+    ("kind", false, "of a failure"),
+];
+
 fn all(body: &mut String, assets: &[Asset<'_>], changes: &Changes) {
     body.push_str(
         "<h2 id=\"all\">All assets</h2>\n<form id=\"filter\" role=\"search\"><label>Find <input type=\"search\" name=\"text\" autocomplete=\"off\" placeholder=\"id, kind, words of a failure\"></label> <output id=\"shown\" aria-live=\"polite\"></output></form>\n\
          <div class=\"scroll tall\" tabindex=\"0\" role=\"region\" aria-label=\"All assets\"><table id=\"assets\" data-sortable><thead><tr>",
     );
-    let heads = [
-        "asset",
-        "state",
-        "change",
-        "#seconds",
-        "#memory [MB]",
-        "#faces",
-        "#genus",
-        "#loops",
-        "#cones",
-        "#patches",
-        "#area distortion",
-        "#log scale, std",
-        "#angle error [rad]",
-        "#images [dB]",
-        "kind",
-    ];
-    for head in heads {
-        let _ = match head.strip_prefix('#') {
-            Some(words) => write!(body, "<th scope=\"col\" class=\"number\">{words}</th>"),
-            None => write!(body, "<th scope=\"col\">{head}</th>"),
-        };
+    for (head, is_number, meaning) in HEADS {
+        let class = if is_number { " class=\"number\"" } else { "" };
+        let _ = write!(
+            body,
+            "<th scope=\"col\"{class} title=\"{meaning}\">{head}</th>"
+        );
     }
     body.push_str("</tr></thead><tbody>\n");
     for (asset, change) in assets.iter().zip(&changes.of) {
@@ -276,9 +362,10 @@ fn row(body: &mut String, asset: &Asset<'_>, change: Option<Change>) {
     let error = record.error.as_deref().unwrap_or_default();
     let _ = write!(
         body,
-        "<tr data-state=\"{state}\" data-words=\"{}\"><td data-value=\"{}\">{}</td><td class=\"{state}\" data-value=\"{state}\">{} {state}</td><td>{}</td>",
+        "<tr data-state=\"{state}\" data-words=\"{}\"><td data-value=\"{}\">{}<span>{}</span></td><td class=\"{state}\" data-value=\"{state}\">{} {state}</td><td>{}</td>",
         escape(error),
         escape(&record.id),
+        thumbnail(asset),
         linked(asset),
         sign(record.state),
         change.map_or("", Change::name)
@@ -293,19 +380,18 @@ fn row(body: &mut String, asset: &Asset<'_>, change: Option<Change>) {
             None => write!(body, "<td class=\"number\" data-value=\"\">–</td>"),
         };
     };
-    let whole = |x: f64| format!("{x:.0}");
-    number(Some(record.seconds), &|x| format!("{x:.2}"));
-    number(record.peak_memory.map(|bytes| bytes as f64 / 1e6), &whole);
+    number(Some(record.seconds), &duration);
+    number(record.peak_memory.map(|bytes| bytes as f64), &memory);
     let of = asset.figures.as_ref();
-    number(of.map(|f| f.faces as f64), &whole);
-    number(of.map(|f| f.genus as f64), &whole);
-    number(of.map(|f| f.boundary_loops as f64), &whole);
-    number(of.map(|f| f.cones as f64), &whole);
-    number(of.map(|f| f.patches as f64), &whole);
-    number(of.map(|f| f.area_distortion), &figure);
-    number(of.map(|f| f.log_scale_std), &figure);
-    number(of.map(|f| f.angle_error_mean), &figure);
-    number(of.and_then(|f| f.image_psnr_db), &|x| format!("{x:.1}"));
+    number(of.map(|f| f.faces as f64), &count);
+    number(of.map(|f| f.genus as f64), &count);
+    number(of.map(|f| f.boundary_loops as f64), &count);
+    number(of.map(|f| f.cones as f64), &count);
+    number(of.map(|f| f.patches as f64), &count);
+    number(of.map(|f| f.area_distortion), &three_digits);
+    number(of.map(|f| f.log_scale_std), &three_digits);
+    number(of.map(|f| f.angle_error_mean), &angle);
+    number(of.and_then(|f| f.image_psnr_db), &|x| format!("{x:.1} dB"));
     let kind = record.kind.map_or("", |kind| kind.name());
     let _ = writeln!(body, "<td>{kind}</td></tr>");
 }

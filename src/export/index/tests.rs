@@ -89,9 +89,9 @@ fn changes_are_told_from_the_run_before() {
     assert_eq!(failures.matches("<li>").count(), 2);
     assert!(failures.contains("the total is &lt;b&gt;4&lt;/b&gt;, 2 &amp; more"));
     assert!(of("Fixed").contains("mended"));
-    assert!(of("Worse").contains("0.1000 → 0.5000"));
+    assert!(of("Worse").contains("0.100 → 0.500"));
     assert!(of("New</summary>").contains(">fresh<"));
-    assert!(of("Removed").contains("gone"));
+    assert!(of("Not in this run").contains("gone"));
     // New failures stand first.
     let place = |title: &str| second.find(&format!("</b> {title}")).unwrap();
     assert!(place("New failures") < place("Fixed") && place("Fixed") < place("Worse"));
@@ -114,7 +114,7 @@ fn changes_are_told_from_the_run_before() {
 #[test]
 fn durations_are_read_at_a_glance() {
     for (seconds, words) in [
-        (0.04, "0.0 s"),
+        (0.04, "0.04 s"),
         (59.4, "59.4 s"),
         (61.0, "1 min 1 s"),
         (7_260.0, "2 h 1 min"),
@@ -122,6 +122,70 @@ fn durations_are_read_at_a_glance() {
     ] {
         assert_eq!(page::duration(seconds), words);
     }
+}
+
+#[test]
+fn figures_are_read_at_a_glance() {
+    use page::{angle, count, memory, three_digits};
+    for (x, words) in [
+        (0.0, "0"),
+        (0.576_1, "0.576"),
+        (12.34, "12.3"),
+        (1234.0, "1234"),
+        (2.5e-7, "2.50e-7"),
+        (f64::INFINITY, "inf"),
+    ] {
+        assert_eq!(three_digits(x), words);
+    }
+    for (x, words) in [
+        (7.0, "7"),
+        (63_396.0, "63\u{202f}396"),
+        (1e6, "1\u{202f}000\u{202f}000"),
+    ] {
+        assert_eq!(count(x), words);
+    }
+    for (x, words) in [(9e4, "90 kB"), (253e6, "253 MB"), (1.43e9, "1.4 GB")] {
+        assert_eq!(memory(x), words);
+    }
+    assert_eq!(angle(0.04665), "2.67°");
+}
+
+#[test]
+fn assets_of_other_runs_are_left_out_and_not_forgotten() {
+    use State::Built;
+    let root = tempfile::tempdir().unwrap();
+    let both = [("one", Built, 0.1), ("other", Built, 0.1)];
+    night(root.path(), &both);
+    let (_, second) = night(root.path(), &both[..1]);
+    assert_eq!(second.matches("<tr data-state").count(), 1);
+    assert!(group(&second, "Not in this run").unwrap().contains("other"));
+    // It is not missed a second time, and no new one when it comes back.
+    let (_, third) = night(root.path(), &both[..1]);
+    assert!(third.contains("<p>None.</p>"), "{third}");
+    let (_, fourth) = night(root.path(), &[both[0], ("other", Built, 0.5)]);
+    assert_eq!(group(&fourth, "New</summary>"), None);
+    assert!(group(&fourth, "Worse").unwrap().contains("0.100 → 0.500"));
+}
+
+#[test]
+fn what_was_built_is_shown_where_pictures_were_drawn() {
+    let root = tempfile::tempdir().unwrap();
+    let mut manifest = Manifest::default();
+    let pictured = |id: &str, state, files: &[&str]| {
+        let mut record = record(id, state);
+        record.files = files.iter().map(|file| format!("{id}/{file}")).collect();
+        record
+    };
+    let two = ["component-000/preview.png", "component-001/preview.png"];
+    manifest.insert(pictured("a b", State::Built, &two));
+    manifest.insert(pictured("plain", State::Cached, &["atlas.json"]));
+    manifest.insert(pictured("kept", State::Failed, &["preview.png"]));
+    manifest.insert(pictured("out", State::Built, &["../preview.png"]));
+    write(root.path(), &manifest).unwrap();
+    let text = fs::read_to_string(root.path().join(FILE_NAME)).unwrap();
+    assert_eq!(text.matches("<img").count(), 1, "{text}");
+    assert!(text.contains("<img src=\"./a%20b/component-000/preview.png\""));
+    assert!(text.contains("loading=\"lazy\""));
 }
 
 #[test]

@@ -46,6 +46,7 @@ pub use surface::{log_scale, painted, preview};
 
 use crate::export::ExportError;
 use crate::export::folder::Staging;
+use crate::export::names;
 use crate::product::AffineAtlas;
 use image::{ImageBuffer, ImageEncoder, PixelWithColorType};
 
@@ -60,7 +61,7 @@ pub fn write(
     // One view and one light for both pictures of space.
     let portrait = surface::Portrait::new(atlas, size);
     let pictures = [
-        ("preview.png", portrait.preview()),
+        (names::PREVIEW, portrait.preview()),
         ("layout.png", layout(atlas, size)),
         ("log-scale.png", portrait.log_scale()),
         ("convergence.png", convergence(atlas, size)),

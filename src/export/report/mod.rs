@@ -182,7 +182,13 @@ fn page(
     }
     let title = format!("{} · affine atlas", provenance.asset);
     let scripts = [html::TABLES, SURFACE, SCRIPT];
-    Ok(html::page(&title, STYLE, &body, &scripts))
+    Ok(html::page(
+        &title,
+        STYLE,
+        &body,
+        &scripts,
+        html::Pictures::Inside,
+    ))
 }
 
 fn header(body: &mut String, document: &Document, provenance: &Provenance) {

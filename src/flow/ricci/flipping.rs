@@ -1,4 +1,4 @@
-//! Vertex scaling with flips, from the base mesh A to the final triangulation C (method 2, "Flips").
+//! Vertex scaling with flips, from the base mesh A to the final triangulation C (`docs/method.md`, 2, "Flips").
 //!
 //! *Enters:* connectivity A and its lengths, curvatures. *Leaves:* a [`FlatMetric`] with the three triangulations and the
 //! correspondences between them. *Guaranteed:* in exact arithmetic a solution for every prescription that meets Gauss–Bonnet with

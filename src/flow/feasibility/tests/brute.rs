@@ -28,7 +28,7 @@ struct Case {
     boundary: BoundaryCondition,
 }
 
-/// Least slack over all sets, by the formulas of method.md as they stand there.
+/// Least slack over all sets, by the formulas of `docs/method.md`, 1, as they stand there.
 struct Brute {
     counted: Vec<VertexId>,
     theta: VertexVec<i128>,
