@@ -14,6 +14,7 @@
 //! attribute of the images, `quarter_turns` and seams along the surface's boundary.
 
 mod arrays;
+mod border;
 mod central;
 mod channels;
 mod charts;

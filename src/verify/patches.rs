@@ -9,7 +9,7 @@ use super::formulas::{
 };
 use super::grid::Grid;
 use super::surface::{Surface, UnionFind};
-use super::{Verdicts, VerifyOptions};
+use super::{Verdicts, VerifyOptions, border};
 use rayon::prelude::*;
 
 /// Faces overlap where they share more than this, in diameters of the patch.
@@ -99,7 +99,7 @@ pub(super) fn check(
     let measured: Vec<Measured> = document
         .patches
         .par_iter()
-        .map(|patch| measure(arrays, patch, groups.of(patch.id), slit))
+        .map(|patch| measure(surface, arrays, patch, groups.of(patch.id), slit))
         .collect();
     let mut shape = Worst::default();
     let mut range = Worst::default();
@@ -203,7 +203,13 @@ pub(super) fn extent(arrays: &Arrays, faces: &[u32]) -> Extent2 {
     Extent2::of(faces.iter().flat_map(|f| arrays.patch_uv[*f as usize]))
 }
 
-fn measure(arrays: &Arrays, patch: &Patch, faces: &[u32], slit: &Slit) -> Measured {
+fn measure(
+    surface: &Surface<'_>,
+    arrays: &Arrays,
+    patch: &Patch,
+    faces: &[u32],
+    slit: &Slit,
+) -> Measured {
     let extent = extent(arrays, faces);
     let (diameter, reach) = (extent.diagonal(), extent.reach());
     let uv = |f: u32| arrays.patch_uv[f as usize];
@@ -234,11 +240,24 @@ fn measure(arrays: &Arrays, patch: &Patch, faces: &[u32], slit: &Slit) -> Measur
     // `rectangle` patches are not similar to the chart.
     let is_rectangle = patch.domain == "rectangle" && patch.patch_to_chart.is_none();
     let lacks_map = patch.patch_to_chart.is_none() && !is_rectangle;
+    let flipped = faces.iter().any(|f| !is_positive(uv(*f), reach));
+    let tolerance = OVERLAP_TOLERANCE * diameter;
+    let mut overlap = find_overlap(&triangles, tolerance);
+    if overlap == Overlap::Undecided && !flipped {
+        let cut = arrays.cut.as_flattened();
+        let inside = |h: usize| {
+            let beyond = surface.twin(h).map(|t| arrays.patch[t / 3]);
+            cut[h] == 0 && beyond == Some(arrays.patch[h / 3])
+        };
+        if border::is_simple(surface, arrays, faces, inside, tolerance) == Some(true) {
+            overlap = Overlap::None;
+        }
+    }
     Measured {
         shape: shape.0,
-        flipped: faces.iter().any(|f| !is_positive(uv(*f), reach)),
+        flipped,
         dissimilar: lacks_map || apart.0 > SIMILARITY_TOLERANCE * slit.diameter,
-        overlap: find_overlap(&triangles, OVERLAP_TOLERANCE * diameter),
+        overlap,
         log_scale_range: (range[1] - range[0]).max(0.0),
     }
 }

@@ -1,0 +1,186 @@
+//! Whether the border of a patch crosses itself: another way to see that no two of its faces overlap.
+//!
+//! A disk whose faces are all counterclockwise covers a point of the plane as often as its border winds around that point. So where the
+//! border is one simple closed curve, every point is covered once at most. This takes the border's edges alone: patches of long faces that
+//! all meet in one point, where every pair of faces would have to be looked at, have a short one.
+//!
+//! *Not guaranteed:* that a border which only touches itself, to the tolerance, is told from one that crosses itself there; its turning
+//! number, which must be 1, tells most of these.
+
+use super::arrays::Arrays;
+use super::central::at_corner;
+use super::formulas::{Point2, distance2, sub2};
+use super::grid::Grid;
+use super::surface::Surface;
+use std::collections::HashSet;
+use std::f64::consts::{PI, TAU};
+
+/// Most pairs of edges that are compared, for each edge, and besides.
+const PAIRS: (u64, u64) = (2000, 10_000_000);
+
+/// Whether a patch is a disk with a border that is one simple closed curve, up to `tolerance` (a length). `None` where the patch is no disk, or
+/// where that cannot be told in bounded work. `inside` tells halfedges across which the patch goes on.
+pub(super) fn is_simple(
+    surface: &Surface<'_>,
+    arrays: &Arrays,
+    faces: &[u32],
+    inside: impl Fn(usize) -> bool,
+    tolerance: f64,
+) -> Option<bool> {
+    let halfedges = || {
+        faces
+            .iter()
+            .flat_map(|f| 3 * *f as usize..3 * *f as usize + 3)
+    };
+    let border: Vec<usize> = halfedges().filter(|h| !inside(*h)).collect();
+    let path = around(surface, &border, &inside)?;
+    // Euler's formula: edges are counted by their halfedges, vertices by the corners that hang together.
+    let edges = (3 * faces.len() + border.len()) / 2;
+    if fans(surface, faces, &inside) + faces.len() != edges + 1 {
+        return None;
+    }
+    let points: Vec<Point2> = (path.iter())
+        .map(|h| at_corner(&arrays.patch_uv, surface.tail_corner(*h)))
+        .collect();
+    if (turning(&points) - TAU).abs() > PI {
+        return Some(false);
+    }
+    let edges: Vec<[Point2; 2]> = (0..points.len())
+        .map(|i| [points[i], points[(i + 1) % points.len()]])
+        .collect();
+    crosses(&edges, tolerance).map(|crosses| !crosses)
+}
+
+/// The border from its first halfedge on; `None` where it is not one closed path.
+fn around(
+    surface: &Surface<'_>,
+    border: &[usize],
+    inside: &impl Fn(usize) -> bool,
+) -> Option<Vec<usize>> {
+    let first = *border.first()?;
+    let mut path = vec![first];
+    loop {
+        let mut h = surface.next(*path.last()?);
+        while inside(h) {
+            h = surface.next(surface.twin(h)?);
+        }
+        if h == first {
+            return (path.len() == border.len()).then_some(path);
+        }
+        if path.len() == border.len() {
+            return None;
+        }
+        path.push(h);
+    }
+}
+
+/// Number of vertices of the patch, one that the border meets several times counted as often.
+fn fans(surface: &Surface<'_>, faces: &[u32], inside: &impl Fn(usize) -> bool) -> usize {
+    let mut seen: HashSet<usize> = HashSet::with_capacity(3 * faces.len());
+    let mut count = 0;
+    for h in faces
+        .iter()
+        .flat_map(|f| 3 * *f as usize..3 * *f as usize + 3)
+    {
+        if !seen.insert(h) {
+            continue;
+        }
+        count += 1;
+        // Halfedges that leave one vertex: counterclockwise, and, from a border, clockwise.
+        let mut at = h;
+        let mut closed = false;
+        while let Some(t) = Some(surface.previous(at)).filter(|p| inside(*p)) {
+            let Some(next) = surface.twin(t) else { break };
+            if !seen.insert(next) {
+                closed = next == h;
+                break;
+            }
+            at = next;
+        }
+        let mut at = h;
+        while !closed && inside(at) {
+            let Some(t) = surface.twin(at) else { break };
+            at = surface.next(t);
+            if !seen.insert(at) {
+                break;
+            }
+        }
+    }
+    count
+}
+
+/// The sum of exterior angles of a polygon, radians: 2π times its turning number.
+fn turning(points: &[Point2]) -> f64 {
+    let n = points.len();
+    let directions = (0..n).map(|i| sub2(points[(i + 1) % n], points[i]));
+    let directions: Vec<Point2> = directions.filter(|d| *d != [0.0; 2]).collect();
+    let n = directions.len();
+    let angle = |i: usize| {
+        let (a, b) = (directions[i], directions[(i + 1) % n]);
+        (a[0] * b[1] - a[1] * b[0]).atan2(a[0] * b[0] + a[1] * b[1])
+    };
+    (0..n).map(angle).sum()
+}
+
+/// Whether two edges cross, each having the ends of the other on either side by more than `tolerance`; `None` where there are too many near each other.
+fn crosses(edges: &[[Point2; 2]], tolerance: f64) -> Option<bool> {
+    let limit = 256 * edges.len() + 100_000;
+    let grid = Grid::new(edges, tolerance, limit).ok()?;
+    let in_cell = |cell| grid.cell_items(cell);
+    let pairs: u64 = (0..grid.cells())
+        .map(|cell| (in_cell(cell).len() as u64).pow(2))
+        .sum();
+    if pairs > PAIRS.0 * edges.len() as u64 + PAIRS.1 {
+        return None;
+    }
+    let side = |[p, q]: [Point2; 2], r: Point2| {
+        let (d, e) = (sub2(q, p), sub2(r, p));
+        let height = (d[0] * e[1] - d[1] * e[0]) / distance2(p, q);
+        i32::from(height > tolerance) - i32::from(height < -tolerance)
+    };
+    let apart = |a: [Point2; 2], b: [Point2; 2]| side(a, b[0]) * side(a, b[1]) >= 0;
+    let crossing = (0..grid.cells()).any(|cell| {
+        let items = in_cell(cell);
+        items.iter().enumerate().any(|(i, a)| {
+            items[i + 1..].iter().any(|b| {
+                let (a, b) = (edges[*a as usize], edges[*b as usize]);
+                !(apart(a, b) || apart(b, a))
+            })
+        })
+    });
+    Some(crossing)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn polygon(points: &[Point2]) -> Vec<[Point2; 2]> {
+        (0..points.len())
+            .map(|i| [points[i], points[(i + 1) % points.len()]])
+            .collect()
+    }
+
+    #[test]
+    fn a_bow_tie_crosses_itself_and_a_notched_square_does_not() {
+        let tie = [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];
+        assert_eq!(crosses(&polygon(&tie), 1e-9), Some(true));
+        assert!(turning(&tie).abs() < 1e-12);
+        let notched = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [1.0, 0.0], [0.0, 2.0]];
+        // The notch touches the lower side.
+        assert_eq!(crosses(&polygon(&notched), 1e-9), Some(false));
+        assert!((turning(&notched) - TAU).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_curve_that_goes_round_twice_has_another_turning_number() {
+        let twice: Vec<Point2> = (0..40)
+            .map(|i| {
+                let (s, c) = (f64::from(i) * 2.0 * TAU / 40.0).sin_cos();
+                let r = 1.0 + 0.01 * f64::from(i);
+                [r * c, r * s]
+            })
+            .collect();
+        assert!((turning(&twice) - 2.0 * TAU).abs() < 1e-9);
+    }
+}
