@@ -25,6 +25,7 @@ pub fn shapes(atlas: &Path) -> BTreeMap<String, (&'static str, Vec<u64>)> {
     let mut found = BTreeMap::new();
     for i in 0..archive.len() {
         let mut entry = archive.by_index(i).expect("an entry");
+        let file_name = entry.name().expect("a name").into_owned();
         let mut bytes = Vec::new();
         entry.read_to_end(&mut bytes).expect("readable");
         let array = NpyFile::new(&bytes[..]).expect("a NumPy array");
@@ -32,9 +33,9 @@ pub fn shapes(atlas: &Path) -> BTreeMap<String, (&'static str, Vec<u64>)> {
             "<f8" => "float64",
             "<u4" => "uint32",
             "|u1" => "uint8",
-            other => panic!("{}: {other}", entry.name()),
+            other => panic!("{file_name}: {other}"),
         };
-        let name = entry.name().trim_end_matches(".npy").to_owned();
+        let name = file_name.trim_end_matches(".npy").to_owned();
         found.insert(name, (dtype, array.shape().to_vec()));
     }
     found

@@ -77,7 +77,7 @@ fn is_met(expression: &str, allowed: &BTreeSet<&str>) -> bool {
 
 fn any(tokens: &mut &[&str], allowed: &BTreeSet<&str>) -> bool {
     let mut met = all(tokens, allowed);
-    while let [&"OR", rest @ ..] = *tokens {
+    while let ["OR", rest @ ..] = *tokens {
         *tokens = rest;
         met |= all(tokens, allowed);
     }
@@ -86,7 +86,7 @@ fn any(tokens: &mut &[&str], allowed: &BTreeSet<&str>) -> bool {
 
 fn all(tokens: &mut &[&str], allowed: &BTreeSet<&str>) -> bool {
     let mut met = one(tokens, allowed);
-    while let [&"AND", rest @ ..] = *tokens {
+    while let ["AND", rest @ ..] = *tokens {
         *tokens = rest;
         met &= one(tokens, allowed);
     }
@@ -95,14 +95,14 @@ fn all(tokens: &mut &[&str], allowed: &BTreeSet<&str>) -> bool {
 
 fn one(tokens: &mut &[&str], allowed: &BTreeSet<&str>) -> bool {
     match *tokens {
-        [&"(", rest @ ..] => {
+        ["(", rest @ ..] => {
             *tokens = rest;
             let met = any(tokens, allowed);
-            let closed = matches!(*tokens, [&")", ..]);
+            let closed = matches!(*tokens, [")", ..]);
             *tokens = tokens.get(1..).unwrap_or_default();
             met && closed
         }
-        [licence, &"WITH", exception, rest @ ..] => {
+        [licence, "WITH", exception, rest @ ..] => {
             *tokens = rest;
             allowed.contains(&*format!("{licence} WITH {exception}"))
         }

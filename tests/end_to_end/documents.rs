@@ -152,7 +152,7 @@ fn every_array_of_atlas_npz_is_described() {
             .map(|n| counts.get(n).copied().or(n.parse().ok()).expect(n))
             .collect();
         assert_eq!(&stated, shape, "{name}");
-        assert_eq!(cells[2], dtype, "{name}");
+        assert_eq!(cells[2], *dtype, "{name}");
     }
 }
 
@@ -277,7 +277,9 @@ fn the_readme_is_short_and_says_what_it_is_for() {
         .lines()
         .skip(1)
         .take_while(|line| line.starts_with("  "));
+    // Lines that go on are further in.
     let named: Vec<&str> = commands
+        .filter(|line| !line.starts_with("   "))
         .filter_map(|line| line.split_whitespace().next())
         .collect();
     assert!(named.len() > 10, "{named:?}");

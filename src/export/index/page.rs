@@ -380,7 +380,9 @@ fn row(body: &mut String, asset: &Asset<'_>, change: Option<Change>) {
             None => write!(body, "<td class=\"number\" data-value=\"\">–</td>"),
         };
     };
-    number(Some(record.seconds), &duration);
+    // What was kept from an earlier run took no time in this one.
+    let built = record.state != State::Cached;
+    number(built.then_some(record.seconds), &duration);
     number(record.peak_memory.map(|bytes| bytes as f64), &memory);
     let of = asset.figures.as_ref();
     number(of.map(|f| f.faces as f64), &count);
