@@ -6,6 +6,9 @@ use std::process::{Command, Output};
 #[path = "cli_messages/plans.rs"]
 mod plans;
 
+#[path = "cli_messages/streams.rs"]
+mod streams;
+
 /// Runs the command in a folder, as if its output went to a file.
 fn run(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_affine-atlas"))

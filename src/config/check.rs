@@ -2,6 +2,7 @@
 
 use super::error::{ConfigError, Location};
 use super::keys::{self, Kind};
+use super::limit::Limit;
 use super::overrides::OF_THE_RUN;
 use crate::flow::cones::PiMultiple;
 use std::ops::Range;
@@ -157,6 +158,13 @@ fn check_value(
                 errors.push(out_of_range(given.as_str()));
             }
         }
+        (Kind::Limit(max), DeValue::Integer(given)) => {
+            let number = i64::from_str_radix(given.as_str(), given.radix());
+            if !number.is_ok_and(|number| (1..=max).contains(&number)) {
+                errors.push(out_of_range(given.as_str()));
+            }
+        }
+        (Kind::Limit(_), DeValue::String(given)) if Limit::WORDS.contains(&&**given) => {}
         (Kind::CurvatureIn { min, below }, DeValue::String(given)) => {
             // A text that is no curvature is left to the type, which says what is wrong with it.
             if let Ok(curvature) = given.parse::<PiMultiple>()

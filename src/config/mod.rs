@@ -12,12 +12,14 @@ pub mod assets;
 mod check;
 pub mod error;
 pub mod keys;
+mod limit;
 mod load;
 pub(crate) mod overrides;
 mod presets;
 mod sections;
 
 pub use error::{ConfigError, Location};
+pub use limit::Limit;
 pub use load::{Loaded, defaults, load, parse};
 pub use overrides::Override;
 pub use presets::Preset;

@@ -3,7 +3,7 @@
 //! *Guaranteed:* whatever the file holds nothing panics, and memory is bounded by the size that the caller states
 //! and the bytes of the file.
 
-use super::bounded::read_bounded;
+use super::bounded::{read_bounded, unpacked_limit};
 use ::exr::prelude as openexr;
 use ::exr::prelude::{Compression, FlatSamples, MetaData, ReadChannels, ReadLayers};
 use std::collections::BTreeMap;
@@ -12,9 +12,6 @@ use std::path::Path;
 
 /// Largest image file that is read (bytes).
 const SIZE_LIMIT: u64 = 1 << 32;
-/// No lossless compression of the contract makes data smaller than this; an image that claims more texels
-/// than its file can hold is refused before anything is allocated for it.
-const BEST_COMPRESSION: u64 = 1100;
 
 /// The channels of an image.
 pub(crate) struct Image {
@@ -44,7 +41,7 @@ pub(crate) enum Read {
 
 /// Reads an image of the size (columns, rows) that is stated elsewhere.
 pub(crate) fn read(path: &Path, size: [usize; 2]) -> Result<Read, String> {
-    let bytes = read_bounded(path, SIZE_LIMIT)?;
+    let bytes = read_bounded(path, SIZE_LIMIT).map_err(|error| error.to_string())?;
     // The decoder is not ours: should it panic on hostile bytes, that is an unreadable image.
     let decoded = std::panic::catch_unwind(|| decode(&bytes, size));
     decoded.unwrap_or_else(|_| Err("cannot be decoded".to_owned()))
@@ -73,9 +70,11 @@ fn decode(bytes: &[u8], [width, height]: [usize; 2]) -> Result<Read, String> {
     let channels = header.channels.list.len() as u64;
     let texels = (width as u64).saturating_mul(height as u64);
     let claimed = texels.saturating_mul(4 * channels);
-    if claimed > BEST_COMPRESSION.saturating_mul(bytes.len() as u64) {
+    let limit = unpacked_limit(bytes.len() as u64);
+    if claimed > limit {
         return Err(format!(
-            "claims {texels} texels, more than its bytes can hold"
+            "claims {texels} texels of {channels} channels, {claimed} bytes, more than the {limit} that are granted for its {} bytes",
+            bytes.len()
         ));
     }
     let lossless = matches!(

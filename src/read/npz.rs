@@ -1,8 +1,10 @@
 //! A bounded reader of `.npz`: a zip container of NumPy arrays.
 //!
 //! Only what the output contract uses: little-endian f64 and u32, u8, C order. The header's shape must agree
-//! with the entry's size before anything is read, and memory grows only with data that is really there.
+//! with the entry's size before anything is read, memory grows only with data that is really there, and all arrays together
+//! unpack to no more than [`unpacked_limit`] grants for the size of the container.
 
+use super::bounded::{open_regular, unpacked_limit};
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -44,13 +46,22 @@ element!(u8, "uint8", "|u1", "<u1", "u1");
 /// An open container.
 pub(crate) struct Npz {
     archive: ZipArchive<BufReader<File>>,
+    /// Bytes of the container.
+    size: u64,
+    /// Bytes that its arrays may still unpack to.
+    left: u64,
 }
 
 impl Npz {
     pub fn open(path: &Path) -> Result<Self, String> {
-        let file = File::open(path).map_err(|error| error.to_string())?;
+        let (file, size) = open_regular(path).map_err(|error| error.to_string())?;
         let archive = ZipArchive::new(BufReader::new(file)).map_err(|error| error.to_string())?;
-        Ok(Self { archive })
+        let left = unpacked_limit(size);
+        Ok(Self {
+            archive,
+            size,
+            left,
+        })
     }
 
     /// Whether an array of that name is there.
@@ -109,6 +120,15 @@ impl Npz {
                 bytes as u64 + header_bytes as u64
             )));
         }
+        let Some(left) = self.left.checked_sub(bytes as u64) else {
+            return Err(at(format!(
+                "unpacks to {bytes} bytes, and the arrays of a container of {} bytes may unpack to {} together, of which {} are left",
+                self.size,
+                unpacked_limit(self.size),
+                self.left
+            )));
+        };
+        self.left = left;
         let mut values = Vec::with_capacity(count.min(1 << 16));
         let mut buffer = vec![0; T::SIZE * (1 << 13)];
         let mut left = bytes;

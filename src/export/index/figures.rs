@@ -2,11 +2,11 @@
 
 use super::history::Past;
 use crate::export::manifest::{Manifest, Record, State};
+use crate::read::bounded::{JSON_LIMIT, read_bounded};
 use rayon::prelude::*;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 /// An asset of the run.
@@ -103,7 +103,7 @@ fn read(output_root: &Path, record: &Record) -> Option<Figures> {
     let mut all: Option<Figures> = None;
     for file in documents {
         // A file that is gone or broken says nothing; `verify` is there to find it.
-        let bytes = fs::read(output_root.join(file)).ok()?;
+        let bytes = read_bounded(&output_root.join(file), JSON_LIMIT).ok()?;
         let document: Document = serde_json::from_slice(&bytes).ok()?;
         let sum = all.get_or_insert_default();
         let Quality {
