@@ -327,11 +327,6 @@ fn images_that_claim_more_than_their_files_warrant_are_failed_checks() {
     let check = verdicts.checks.iter().find(|c| c.figure.contains("claims"));
     let check = check.expect("a check of the image");
     assert!(!check.passed);
-    assert!(
-        check.figure.contains("more than the 13"),
-        "{}",
-        check.figure
-    );
 }
 
 #[test]
@@ -353,7 +348,7 @@ fn an_image_of_two_patches_is_a_failed_check() {
 }
 
 /// A pipe would be waited for, and a device gives bytes without end.
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 #[test]
 fn pipes_and_links_to_devices_are_failed_checks() {
     use rustix::fs::{CWD, FileType, Mode, mknodat};

@@ -13,10 +13,10 @@ pub(crate) fn is_inside(path: &str) -> bool {
 /// Largest file of JSON, or of one JSON object a line, that is read into memory (bytes).
 pub(crate) const JSON_LIMIT: u64 = 1 << 30;
 
-/// How many bytes files of `files` bytes may unpack to: 128 MiB, which are a million triangles with their attributes, and besides 256 for
-/// every byte of the files, because a large Draco stream of 1.2 bytes a triangle with normals and texture coordinates takes 190.
-pub(crate) const fn unpacked_limit(files: u64) -> u64 {
-    (128u64 << 20).saturating_add(files.saturating_mul(256))
+/// How many bytes files of `files` bytes may unpack to: `floor`, and 256 for every byte of the files, because a large Draco stream of
+/// 1.2 bytes a triangle with normals and texture coordinates takes 190.
+pub(crate) const fn unpacked_limit(floor: u64, files: u64) -> u64 {
+    floor.saturating_add(files.saturating_mul(256))
 }
 
 /// Opens a regular file and tells its length. Links are followed.
@@ -94,7 +94,7 @@ mod tests {
         assert_eq!(missing.kind(), io::ErrorKind::NotFound);
     }
 
-    #[cfg(unix)]
+    #[cfg(target_os = "linux")]
     #[test]
     fn pipes_and_devices_are_not_opened() {
         use rustix::fs::{CWD, FileType, Mode, mknodat};

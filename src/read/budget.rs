@@ -7,6 +7,9 @@
 use super::bounded::unpacked_limit;
 use super::error::ReadProblem;
 
+/// Bytes that any mesh may unpack to, however small its files are: a million triangles with their attributes.
+const FLOOR: u64 = 128 << 20;
+
 /// What has been counted so far, and the limits.
 pub(super) struct Budget {
     files: u64,
@@ -33,7 +36,7 @@ impl Budget {
     /// Counts bytes that something is about to unpack to.
     pub fn unpack(&mut self, bytes: u64, what: impl Fn() -> String) -> Result<(), ReadProblem> {
         self.unpacked = self.unpacked.saturating_add(bytes);
-        let limit = unpacked_limit(self.files);
+        let limit = unpacked_limit(FLOOR, self.files);
         if self.unpacked > limit {
             return Err(ReadProblem::TooMuchUnpacked {
                 what: what(),
@@ -49,7 +52,7 @@ impl Budget {
     pub fn left(&self) -> u64 {
         let total = self.files.saturating_add(self.unpacked);
         let below_total = self.max_file_bytes.saturating_sub(total);
-        below_total.min(unpacked_limit(self.files).saturating_sub(self.unpacked))
+        below_total.min(unpacked_limit(FLOOR, self.files).saturating_sub(self.unpacked))
     }
 
     fn check_total(&self, what: impl Fn() -> String) -> Result<(), ReadProblem> {
@@ -73,13 +76,13 @@ mod tests {
     fn what_unpacks_is_in_proportion_to_the_files() {
         let mut budget = Budget::new(u64::MAX);
         let what = || "accessor 7".to_owned();
-        let floor = unpacked_limit(0);
+        let floor = unpacked_limit(FLOOR, 0);
         budget.unpack(floor, what).unwrap();
         let message = budget.unpack(1, what).unwrap_err().to_string();
         assert!(message.contains("accessor 7"), "{message}");
         assert!(message.contains(&format!("{}", floor + 1)), "{message}");
         budget.read(10, what).unwrap();
-        let more = unpacked_limit(10) - floor;
+        let more = unpacked_limit(FLOOR, 10) - floor;
         assert_eq!(more, 2560);
         assert_eq!(budget.left(), more - 1);
         budget.unpack(more - 1, what).unwrap();

@@ -2,7 +2,7 @@
 
 use super::ReadParams;
 use super::budget::Budget;
-use super::error::{Place, ReadProblem};
+use super::error::{Place, ReadProblem, shorten};
 use crate::geometry::ids::NONE;
 use crate::geometry::mesh::{AttributeKind, CornerAttribute, Part, Soup};
 
@@ -133,8 +133,10 @@ impl SoupBuilder {
         values: &[f32],
     ) -> Result<(), ReadProblem> {
         let bytes = (12 * components as u64).saturating_mul(self.soup.faces.len() as u64);
-        self.budget
-            .unpack(bytes, || format!("the attribute {kind:?}"))?;
+        self.budget.unpack(bytes, || match &kind {
+            AttributeKind::Custom(name) => format!("the attribute {}", shorten(name.as_bytes())),
+            known => format!("the attribute {known:?}"),
+        })?;
         let corners = self.soup.faces.iter().flatten();
         let row = |&v: &u32| &values[v as usize * components..(v as usize + 1) * components];
         let values = corners.flat_map(row).copied().collect();

@@ -107,7 +107,7 @@ pub enum ReadProblem {
     },
     /// More unpacked than the size of the files warrants.
     #[error(
-        "{what} would bring what the asset unpacks to to {bytes} bytes, more than the {limit} that are granted for {files} bytes of files; store values plainly and once instead of sparse, repeated or compressed, or split the asset"
+        "{what} would make the asset unpack to {bytes} bytes, more than the {limit} that are granted for {files} bytes of files; store values plainly and once instead of sparse, repeated or compressed, or split the asset"
     )]
     TooMuchUnpacked {
         /// What is being unpacked.

@@ -13,6 +13,9 @@ use zip::ZipArchive;
 /// Longest header that is read (NumPy writes less than 200 bytes for arrays like ours).
 const HEADER_LIMIT: usize = 1 << 16;
 
+/// Bytes that the arrays of any container may unpack to.
+const FLOOR: u64 = 64 << 20;
+
 /// A number type of the contract.
 pub(crate) trait Element: Copy {
     /// NumPy's names for it.
@@ -56,7 +59,7 @@ impl Npz {
     pub fn open(path: &Path) -> Result<Self, String> {
         let (file, size) = open_regular(path).map_err(|error| error.to_string())?;
         let archive = ZipArchive::new(BufReader::new(file)).map_err(|error| error.to_string())?;
-        let left = unpacked_limit(size);
+        let left = unpacked_limit(FLOOR, size);
         Ok(Self {
             archive,
             size,
@@ -124,7 +127,7 @@ impl Npz {
             return Err(at(format!(
                 "unpacks to {bytes} bytes, and the arrays of a container of {} bytes may unpack to {} together, of which {} are left",
                 self.size,
-                unpacked_limit(self.size),
+                unpacked_limit(FLOOR, self.size),
                 self.left
             )));
         };
