@@ -372,7 +372,7 @@ fn pipes_and_links_to_devices_are_failed_checks() {
         for verdicts in [piped, linked] {
             let verdicts = verdicts.expect("a folder");
             let said = verdicts.to_string();
-            let refused = said.contains("is not a regular file");
+            let refused = said.contains("it is no regular file");
             // Without a manifest that can be read the folder counts as that of an asset.
             assert_eq!(refused, name != "manifest.jsonl", "{name}: {said}");
             assert_eq!(verdicts.all_passed(), !refused, "{name}: {said}");

@@ -25,7 +25,7 @@ pub(crate) const fn unpacked_limit(floor: u64, files: u64) -> u64 {
 /// Of kind [`io::ErrorKind::InvalidInput`] for a folder, a pipe, a socket or a device, none of which is opened: that could wait for ever,
 /// or give bytes without end.
 pub(crate) fn open_regular(path: &Path) -> io::Result<(File, u64)> {
-    let irregular = || io::Error::new(io::ErrorKind::InvalidInput, "is not a regular file");
+    let irregular = || io::Error::new(io::ErrorKind::InvalidInput, "it is no regular file");
     if !fs::metadata(path)?.is_file() {
         return Err(irregular());
     }
