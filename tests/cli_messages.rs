@@ -6,6 +6,9 @@ use std::process::{Command, Output};
 #[path = "cli_messages/plans.rs"]
 mod plans;
 
+#[path = "cli_messages/streams.rs"]
+mod streams;
+
 /// Runs the command in a folder, as if its output went to a file.
 fn run(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_affine-atlas"))
@@ -464,7 +467,7 @@ fn texture_without_a_folder_or_a_pattern() {
     std::fs::create_dir(folder.path().join("atlas")).expect("created");
     std::fs::write(folder.path().join("atlas/atlas.json"), "{}").expect("written");
     insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @"failed: atlas (input): the pattern a.png cannot be read: No such file or directory (os error 2)");
-    insta::assert_snapshot!(texture(&["atlas", "-p", "empty"], 1), @"failed: atlas (input): the pattern empty cannot be read: it is no file");
+    insta::assert_snapshot!(texture(&["atlas", "-p", "empty"], 1), @"failed: atlas (input): the pattern empty cannot be read: it is no regular file");
     std::fs::write(folder.path().join("a.png"), "no image").expect("written");
     insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @"failed: atlas (input): the pattern a.png is no image that can be read (Format error decoding Png: Invalid PNG signature.); give a PNG or JPEG file");
     std::fs::write(

@@ -914,9 +914,11 @@ fn attributes_that_would_fill_the_memory_are_counted() {
     });
     asset.json["meshes"][0]["primitives"] = primitives.collect();
     let glb = asset.glb();
-    // 200 triangles × 3 corners × 100 attributes × 4 bytes.
-    let primitives = 100 * 3 * 512;
+    // 200 triangles × 3 corners × 100 attributes × 4 bytes; 100 times an object with two attributes, 4 vertices and 2 triangles.
+    let primitives = 100 * (3 * 512 + 4 * 24 + 2 * 16);
     let needed = 240_000 + glb.len() as u64 + object_bytes(&asset.json_bytes()) + primitives;
+    // 8 bytes a number of the positions, the indices and the attribute of each primitive.
+    let numbers = 100 * 8 * (12 + 6 + 4);
     let read = |limit: u64| {
         let params = ReadParams {
             max_file_bytes: limit,
@@ -931,7 +933,123 @@ fn attributes_that_would_fill_the_memory_are_counted() {
         )),
         "{message}"
     );
-    assert_eq!(read(needed).unwrap().soup.attributes.len(), 100);
+    let message = read(needed + numbers - 1).unwrap_err().to_string();
+    assert!(
+        message.contains(&format!(
+            "reading accessor {heat} would bring the asset to {} bytes",
+            needed + numbers
+        )),
+        "{message}"
+    );
+    let whole = read(needed + numbers).unwrap();
+    assert_eq!(whole.soup.attributes.len(), 100);
+}
+
+/// The refusal of a square whose values unpack to more than its few bytes warrant, and the time it took.
+fn costly(asset: &mut Asset) -> String {
+    let started = std::time::Instant::now();
+    let message = asset.refusal();
+    let seconds = started.elapsed().as_secs_f64();
+    assert!(seconds < 20.0, "{seconds} s: {message}");
+    assert!(
+        message.contains("are granted for") && message.contains("bytes of files"),
+        "{message}"
+    );
+    message
+}
+
+#[test]
+fn what_a_small_file_unpacks_to_is_bounded() {
+    let zeros = |kind: &str, component: u32, count: u64| json!({"componentType": component, "count": count, "type": kind});
+    // Indices without data.
+    let mut asset = square();
+    let indices = asset.push("accessors", zeros("SCALAR", UNSIGNED_SHORT, 290_000_000));
+    asset.json["meshes"][0]["primitives"][0]["indices"] = json!(indices);
+    let message = costly(&mut asset);
+    assert!(
+        message.contains(&format!("accessor {indices} (indices of node 0")),
+        "{message}"
+    );
+    // Positions without data.
+    let mut asset = square();
+    let positions = asset.push("accessors", zeros("VEC3", FLOAT, 50_000_000));
+    asset.json["meshes"][0]["primitives"][0]["attributes"] = json!({"POSITION": positions});
+    let message = costly(&mut asset);
+    assert!(
+        message.contains(&format!("accessor {positions} (POSITION of node 0")),
+        "{message}"
+    );
+    // The same numbers read by thousands of attributes.
+    let mut asset = square();
+    let positions = asset.push("accessors", zeros("VEC3", FLOAT, 100_000));
+    let numbers = asset.push("accessors", zeros("SCALAR", FLOAT, 100_000));
+    let mut attributes: serde_json::Map<String, Value> = (0..8000)
+        .map(|i| (format!("_{i}"), json!(numbers)))
+        .collect();
+    attributes.insert("POSITION".into(), json!(positions));
+    asset.json["meshes"][0]["primitives"][0]["attributes"] = attributes.into();
+    let message = costly(&mut asset);
+    assert!(
+        message.contains(&format!("reading accessor {numbers}")),
+        "{message}"
+    );
+    // The same mesh under thousands of primitives.
+    let mut asset = square();
+    let positions = asset.push("accessors", zeros("VEC3", FLOAT, 10_000));
+    let primitive = json!({"attributes": {"POSITION": positions}});
+    asset.json["meshes"][0]["primitives"] = vec![primitive; 1000].into();
+    costly(&mut asset);
+}
+
+#[test]
+fn a_hundred_thousand_attributes_are_looked_up_quickly() {
+    let mut asset = square();
+    let heat = asset.floats("SCALAR", &[[1.0]; 4]);
+    let mut attributes = asset.json["meshes"][0]["primitives"][0]["attributes"].clone();
+    for i in 0..100_000 {
+        attributes[format!("_{i}")] = json!(heat);
+    }
+    asset.json["meshes"][0]["primitives"][0]["attributes"] = attributes;
+    let started = std::time::Instant::now();
+    assert_eq!(asset.soup().attributes.len(), 100_000);
+    assert!(started.elapsed().as_secs() < 10);
+}
+
+#[test]
+fn images_of_one_place_are_one_image() {
+    let mut asset = square();
+    let mut picture = PNG.to_vec();
+    picture.resize(4 << 20, 0);
+    let view = asset.view(picture);
+    asset.json["images"] = vec![json!({"bufferView": view}); 1500].into();
+    asset.json["textures"] = (0..1500).map(|i| json!({"source": i})).collect();
+    asset.json["materials"] = (0..1500)
+        .map(|i| json!({"normalTexture": {"index": i}}))
+        .collect();
+    let appearance = asset.soup().appearance;
+    assert_eq!(appearance.materials.len(), 1500);
+    assert_eq!(appearance.images.len(), 1);
+    assert!(appearance.textures.iter().all(|texture| texture.image == 0));
+}
+
+#[test]
+fn points_that_a_draco_stream_declares_are_counted_before_they_are_made() {
+    // The count of points stands behind that of the two triangles.
+    let stream = DRACO[0].replace("02020100000002040100", "02020100000002ffffff4f0100");
+    assert_ne!(stream, DRACO[0]);
+    let message = draco(&stream).refusal();
+    assert!(
+        message.contains("it declares 167772159 points where at most 50000000 may follow"),
+        "{message}"
+    );
+    // Triangles that are coded by their neighbours, with 255 attributes that have seams of their own.
+    let stream = DRACO[1].replace("0202010100000004020102", "0202010100000080897a80897aff02");
+    assert_ne!(stream, DRACO[1]);
+    let message = costly(&mut draco(&stream));
+    assert!(
+        message.contains("the Draco data of node 0, mesh 0, primitive 0"),
+        "{message}"
+    );
 }
 
 #[test]

@@ -261,6 +261,126 @@ fn an_entry_larger_than_its_header_says_is_not_unpacked() {
 }
 
 #[test]
+fn arrays_unpack_to_no_more_than_their_container_warrants() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let atlas = torus();
+    atlas.write(folder.path());
+    let file = std::fs::File::create(folder.path().join("atlas.npz")).expect("a file");
+    let mut zip = zip::ZipWriter::new(file);
+    let options = zip::write::SimpleFileOptions::default()
+        .compression_method(zip::CompressionMethod::Deflated);
+    for array in atlas.arrays.npy() {
+        zip.start_file(format!("{}.npy", array.name), options)
+            .expect("an entry");
+        if array.name != "positions" {
+            zip.write_all(&array.file()).expect("written");
+            continue;
+        }
+        // 1.2 GB of zeros as their header says, 1 MB in the container.
+        let mut header =
+            b"\x93NUMPY\x01\0\x76\0{'descr': '<f8', 'fortran_order': False, 'shape': (50331648, 3), }".to_vec();
+        header.resize(127, b' ');
+        header.push(b'\n');
+        zip.write_all(&header).expect("written");
+        for _ in 0..1152 {
+            zip.write_all(&[0; 1 << 20]).expect("written");
+        }
+    }
+    zip.finish().expect("a container");
+    let verdicts = run(folder.path());
+    let last = verdicts.checks.last().expect("a check");
+    assert_eq!(last.name, "arrays have their types and shapes");
+    assert!(
+        last.figure
+            .starts_with("positions: unpacks to 1207959552 bytes, and"),
+        "{}",
+        last.figure
+    );
+}
+
+#[test]
+fn images_that_claim_more_than_their_files_warrant_are_failed_checks() {
+    let folder = tempfile::tempdir().expect("a folder");
+    tube().write(folder.path());
+    // The size is stated twice, and the image is cut behind its header, but what it claims is 3.2 GB.
+    let path = folder.path().join("atlas.json");
+    let text = std::fs::read(&path).expect("written");
+    let mut document: Value = serde_json::from_slice(&text).expect("JSON");
+    let patch = &mut document["patches"][0];
+    let image = folder.path().join(patch["image"].as_str().expect("a name"));
+    let old = [&patch["width"], &patch["height"]].map(|n| n.as_u64().expect("a number") as i32 - 1);
+    patch["width"] = json!(10_000);
+    patch["height"] = json!(10_000);
+    std::fs::write(&path, document.to_string()).expect("written");
+    let mut bytes = std::fs::read(&image).expect("written");
+    for name in ["dataWindow\0box2i\0", "displayWindow\0box2i\0"] {
+        let at = bytes.windows(name.len()).position(|w| w == name.as_bytes());
+        let at = at.expect("a window") + name.len() + 4 + 8;
+        for (k, side) in old.iter().enumerate() {
+            let at = at + 4 * k;
+            assert_eq!(bytes[at..at + 4], side.to_le_bytes());
+            bytes[at..at + 4].copy_from_slice(&9_999i32.to_le_bytes());
+        }
+    }
+    std::fs::write(&image, bytes).expect("written");
+    let verdicts = run(folder.path());
+    let check = verdicts.checks.iter().find(|c| c.figure.contains("claims"));
+    let check = check.expect("a check of the image");
+    assert!(!check.passed);
+}
+
+#[test]
+fn an_image_of_two_patches_is_a_failed_check() {
+    let folder = tempfile::tempdir().expect("a folder");
+    tube().write(folder.path());
+    let path = folder.path().join("atlas.json");
+    let text = std::fs::read(&path).expect("written");
+    let mut document: Value = serde_json::from_slice(&text).expect("JSON");
+    let patches = document["patches"].as_array_mut().expect("a list");
+    let mut again = patches[0].clone();
+    again["id"] = json!(patches.len());
+    patches.push(again);
+    std::fs::write(&path, document.to_string()).expect("written");
+    assert_eq!(
+        failed(&run(folder.path())),
+        ["atlas.json's ids point to its lists"]
+    );
+}
+
+/// A pipe would be waited for, and a device gives bytes without end.
+#[cfg(target_os = "linux")]
+#[test]
+fn pipes_and_links_to_devices_are_failed_checks() {
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
+    let image = "images/0000.exr";
+    for name in [
+        "atlas.json",
+        "atlas.npz",
+        image,
+        "surface.glb",
+        "manifest.jsonl",
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        tube().write(folder.path());
+        let path = folder.path().join(name);
+        let _ = std::fs::remove_file(&path);
+        mknodat(CWD, &path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).expect("a pipe");
+        let piped = verify(folder.path(), &VerifyOptions::default());
+        std::fs::remove_file(&path).expect("removed");
+        std::os::unix::fs::symlink("/dev/zero", &path).expect("a link");
+        let linked = verify(folder.path(), &VerifyOptions::default());
+        for verdicts in [piped, linked] {
+            let verdicts = verdicts.expect("a folder");
+            let said = verdicts.to_string();
+            let refused = said.contains("it is no regular file");
+            // Without a manifest that can be read the folder counts as that of an asset.
+            assert_eq!(refused, name != "manifest.jsonl", "{name}: {said}");
+            assert_eq!(verdicts.all_passed(), !refused, "{name}: {said}");
+        }
+    }
+}
+
+#[test]
 fn a_surface_without_faces_is_a_failed_check() {
     let folder = tempfile::tempdir().expect("a folder");
     let atlas = torus();

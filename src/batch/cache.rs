@@ -12,11 +12,12 @@ use crate::export::ExportError;
 use crate::export::folder::{list_files, write_unsynced};
 use crate::export::manifest::{Record, State};
 use crate::outcome::{AssetOutcome, AssetState};
+use crate::read::bounded::{JSON_LIMIT, is_inside, open_regular, read_bounded};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt;
-use std::fs::{self, File};
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -187,7 +188,7 @@ pub fn check(output: &Path, task: &Task, last: Option<&Record>, demand: Demand<'
 }
 
 fn look(output: &Path, task: &Task, last: Option<&Record>) -> Result<Entry, Reason> {
-    let bytes = match fs::read(entry_path(output, &task.id)) {
+    let bytes = match read_bounded(&entry_path(output, &task.id), JSON_LIMIT) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             return Err(match last.map(|record| record.state) {
@@ -242,7 +243,7 @@ fn whole(folder: &Path, written: &Output) -> Result<(), Reason> {
         file: written.path.clone(),
         missing,
     };
-    if !crate::read::bounded::is_inside(&written.path) {
+    if !is_inside(&written.path) {
         return Err(Reason::EntryDamaged);
     }
     let path = folder.join(&written.path);
@@ -259,7 +260,7 @@ fn whole(folder: &Path, written: &Output) -> Result<(), Reason> {
 /// BLAKE3 in hexadecimal, and length.
 fn hash_file(path: &Path) -> io::Result<(String, u64)> {
     let mut hasher = blake3::Hasher::new();
-    hasher.update_reader(File::open(path)?)?;
+    hasher.update_reader(open_regular(path)?.0)?;
     Ok((hasher.finalize().to_hex().to_string(), hasher.count()))
 }
 

@@ -14,9 +14,10 @@
 
 use crate::config::assets::Input;
 use crate::read::EXTENSIONS;
+use crate::read::bounded::read_bounded;
 use std::collections::HashSet;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// What the entries mean.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -93,6 +94,9 @@ pub fn expand(entries: &[PathBuf], base: &Path, output: &Path) -> Result<Inputs,
     Ok(search.inputs)
 }
 
+/// Largest list of meshes that is read (bytes).
+const LIST_LIMIT: u64 = 1 << 30;
+
 struct Search {
     output: Option<PathBuf>,
     known: HashSet<PathBuf>,
@@ -106,7 +110,8 @@ impl Search {
             path: path.clone(),
             reason,
         };
-        let bytes = fs::read(&path).map_err(|error| unreadable(error.to_string()))?;
+        let bytes =
+            read_bounded(&path, LIST_LIMIT).map_err(|error| unreadable(error.to_string()))?;
         let text = String::from_utf8(bytes).map_err(|error| {
             unreadable(format!(
                 "byte {} is not UTF-8 text",
@@ -206,7 +211,8 @@ impl Search {
         let options = glob::MatchOptions {
             case_sensitive: true,
             require_literal_separator: true,
-            require_literal_leading_dot: true,
+            // Asked of the library it would panic at names that are not Unicode.
+            require_literal_leading_dot: false,
         };
         let matches = glob::glob_with(&format!("{start}{text}"), options);
         let matches = matches.map_err(|error| refused(error.msg.to_owned()))?;
@@ -228,6 +234,9 @@ impl Search {
             }
             let shown = path.strip_prefix(base).unwrap_or(&path).to_owned();
             let below = shown.strip_prefix(&fixed).unwrap_or(&shown).to_owned();
+            if is_hidden(&below) && !is_hidden(given) {
+                continue;
+            }
             self.put(path, shown, Some(below));
         }
         self.note_empty(before, given, "matches no mesh file");
@@ -258,6 +267,14 @@ impl Search {
 fn is_mesh(path: &Path) -> bool {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     extension.is_some_and(|extension| EXTENSIONS.contains(&extension.as_str()))
+}
+
+/// Whether a part of the path begins with a dot, and is not `.` or `..`.
+fn is_hidden(path: &Path) -> bool {
+    path.components().any(|part| match part {
+        Component::Normal(name) => name.as_encoded_bytes().starts_with(b"."),
+        _ => false,
+    })
 }
 
 /// The folders of a glob before its first wildcard.
@@ -347,6 +364,22 @@ mod tests {
         );
         let error = expand(&["a[".into()], root.path(), Path::new("out")).unwrap_err();
         assert!(matches!(error, InputError::Glob { .. }), "{error}");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn globs_pass_names_that_are_not_unicode_and_hidden_ones() {
+        use std::os::unix::ffi::OsStrExt;
+        let root = tree(FILES);
+        let name = std::ffi::OsStr::from_bytes(b"scans/left/\xff.obj");
+        fs::write(root.path().join(name), "").unwrap();
+        let left = pair("scans/left/a.obj", "left/a.obj");
+        let right = pair("scans/right/a.obj", "right/a.obj");
+        assert_eq!(found(root.path(), &["scans/**/*.obj"]), [left, right]);
+        let hidden = pair("scans/.hidden/c.obj", "c.obj");
+        assert_eq!(found(root.path(), &["scans/.hidden/*.obj"]), [hidden]);
+        let hidden = pair("scans/.d.obj", ".d.obj");
+        assert_eq!(found(root.path(), &["scans/.*.obj"]), [hidden]);
     }
 
     #[test]

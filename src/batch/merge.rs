@@ -16,6 +16,7 @@ use crate::export::index::HISTORY_NAME;
 use crate::export::manifest::Record;
 use crate::export::{Action, ExportError};
 use crate::outcome::{AssetOutcome, AssetState};
+use crate::read::bounded::{JSON_LIMIT, read_bounded};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs;
 use std::io;
@@ -198,7 +199,7 @@ pub fn history_before(plan: &Plan) -> Result<PathBuf, ExportError> {
     let aside = plan_folder(output, &plan.header.id).join(HISTORY_NAME);
     if !aside.exists() {
         let current = output.join(HISTORY_NAME);
-        let bytes = match fs::read(&current) {
+        let bytes = match read_bounded(&current, JSON_LIMIT) {
             Ok(bytes) => bytes,
             Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
             Err(error) => return Err(ExportError::io(Action::Read, &current)(error)),

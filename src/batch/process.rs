@@ -7,6 +7,7 @@
 use super::limits;
 use super::task::Task;
 use super::worker::{Event, Job, Voice};
+use crate::config::Limit;
 use crate::outcome::{AssetOutcome, AssetState, Failure, FailureKind};
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::Path;
@@ -27,6 +28,8 @@ pub struct Start<'a> {
     pub plan: Option<&'a str>,
     /// Threads of the worker, at least 1.
     pub threads: usize,
+    /// Most memory that it may take, bytes; none: any.
+    pub memory: Option<u64>,
     /// How it speaks.
     pub voice: Voice,
 }
@@ -49,8 +52,10 @@ pub struct Process {
     child: Child,
     lifeline: Option<ChildStdin>,
     started: Instant,
-    timeout: Duration,
-    memory: u64,
+    timeout: Option<Duration>,
+    memory: Option<u64>,
+    /// Whether `memory` is this process's share, and not a number that somebody asked for.
+    is_share: bool,
     open: usize,
     stage: String,
     outcome: Option<AssetOutcome>,
@@ -68,6 +73,12 @@ pub enum End {
     Cancelled,
 }
 
+/// The signal that ends a process whose file grows beyond its limit.
+#[cfg(unix)]
+const FILE_TOO_LARGE: Option<i32> = Some(rustix::process::Signal::XFSZ.as_raw());
+#[cfg(not(unix))]
+const FILE_TOO_LARGE: Option<i32> = None;
+
 /// What the runtime says before it ends a process for want of memory.
 const NO_MEMORY: &str = "memory allocation of ";
 const NO_STACK: &str = "has overflowed its stack";
@@ -83,14 +94,21 @@ impl Process {
         task: &Task,
         to: &Sender<Message>,
     ) -> io::Result<Self> {
-        let config = &task.settings.config;
+        let mut config = task.settings.config.clone();
+        let is_share = config.run.memory == Limit::Auto;
+        // Paths need not be Unicode, and the worker has its own as arguments. Cones are in their list already.
+        config.input = Default::default();
+        config.output = Default::default();
+        if let Some(file) = &mut config.cones.file {
+            *file = file.to_string_lossy().into_owned().into();
+        }
         let job = Job {
             id: task.id.clone(),
             given: task.given.to_string_lossy().into_owned(),
-            config: config.clone(),
             cone_lines: config.cones.file_lines.clone(),
+            config,
             threads: start.threads,
-            memory: config.run.memory,
+            memory: start.memory.unwrap_or(0),
             plan: start.plan.map(str::to_owned),
             parent: std::process::id(),
             voice: start.voice,
@@ -116,8 +134,9 @@ impl Process {
             id: task.id.clone(),
             lifeline: child.stdin.take(),
             started: Instant::now(),
-            timeout: Duration::from_secs(config.run.timeout),
-            memory: config.run.memory,
+            timeout: task.time_limit(),
+            memory: start.memory,
+            is_share,
             open: 0,
             stage: String::new(),
             outcome: None,
@@ -165,8 +184,8 @@ impl Process {
     /// When it must have ended; none where it may take as long as it likes.
     #[must_use]
     pub fn deadline(&self) -> Option<Instant> {
-        let limited = !self.timeout.is_zero() && self.ended_by_us.is_none();
-        limited.then(|| self.started + self.timeout)
+        let timeout = self.timeout.filter(|_| self.ended_by_us.is_none());
+        timeout.and_then(|timeout| self.started.checked_add(timeout))
     }
 
     /// Notes an event.
@@ -246,7 +265,7 @@ impl Process {
             kind: FailureKind::Timeout,
             message: format!(
                 "was not finished after the {} s of run.timeout ({}): raise run.timeout, or decimate the mesh",
-                self.timeout.as_secs(),
+                self.timeout.unwrap_or_default().as_secs(),
                 self.during()
             ),
         }
@@ -267,11 +286,14 @@ impl Process {
             let asked = words.trim_start_matches(NO_MEMORY);
             let asked = asked.split_whitespace().next().unwrap_or_default();
             return match self.memory {
-                0 => no_memory(format!(
+                None => no_memory(format!(
                     "found no memory for {asked} bytes more {during}: let fewer run at a time (run.jobs, run.total_memory), or decimate the mesh"
                 )),
                 // How many bytes more it asked for depends on threads and on what else the heap holds: records are to be the same on every machine.
-                cap => no_memory(format!(
+                Some(share) if self.is_share => no_memory(format!(
+                    "needed more than the {share} bytes that are its share of the memory that was free ({during}): let fewer run at a time (run.jobs), set run.memory, lower patches.texel_budget, or decimate the mesh"
+                )),
+                Some(cap) => no_memory(format!(
                     "needed more than the {cap} bytes of run.memory ({during}): raise run.memory, lower patches.texel_budget, or decimate the mesh"
                 )),
             };
@@ -280,6 +302,14 @@ impl Process {
             return no_memory(format!(
                 "was ended by the system, whose memory ran out, {during}: let fewer run at a time (run.jobs, run.total_memory), or decimate the mesh"
             ));
+        }
+        if signal.is_some_and(|signal| Some(signal) == FILE_TOO_LARGE) {
+            return Failure {
+                kind: FailureKind::Output,
+                message: format!(
+                    "could not be written: a file grew beyond the largest that this process may write, {during}: raise that limit (`ulimit -f`), or lower patches.texel_budget"
+                ),
+            };
         }
         let report = "this is a mistake of affine-atlas and not of your mesh: please report it with the mesh and the configuration";
         let message = match (signal, status.and_then(|status| status.code())) {

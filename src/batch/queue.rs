@@ -154,7 +154,7 @@ fn do_all(
         sender,
         outcomes: tasks.iter().map(|_| None).collect(),
         jobs: 1,
-        budget: 0,
+        free: None,
     };
     let mut to_build = Vec::new();
     // In parts, so that what is known of thousands of assets is never in memory at once. Reasons are of no interest here, so the manifest need
@@ -175,9 +175,9 @@ fn do_all(
         jobs => jobs,
     };
     queue.jobs = queue.jobs.clamp(1, to_build.len().max(1));
-    queue.budget = match batch.total_memory {
-        0 => limits::available_memory().unwrap_or(u64::MAX),
-        bytes => bytes,
+    queue.free = match batch.total_memory {
+        0 => limits::available_memory(),
+        bytes => Some(bytes),
     };
     queue.waiting = to_build.into();
     queue.work(&receiver, recorder);
@@ -196,7 +196,8 @@ struct Queue<'a> {
     sender: Sender<Message>,
     outcomes: Vec<Option<AssetOutcome>>,
     jobs: usize,
-    budget: u64,
+    /// Memory for all processes together, where it is known.
+    free: Option<u64>,
 }
 
 impl Queue<'_> {
@@ -268,7 +269,7 @@ impl Queue<'_> {
             .map(|&number| self.tasks[number].memory());
         let taken = taken.fold(0, u64::saturating_add);
         self.running.len() < self.jobs
-            && taken.saturating_add(self.tasks[next].memory()) <= self.budget
+            && taken.saturating_add(self.tasks[next].memory()) <= self.free.unwrap_or(u64::MAX)
     }
 
     fn start_next(&mut self, recorder: &mut dyn Recording) {
@@ -290,6 +291,7 @@ impl Queue<'_> {
             output: self.batch.output,
             plan: self.batch.plan,
             threads,
+            memory: task.memory_limit(self.free, self.jobs),
             voice: self.batch.voice,
         };
         match Process::start(&start, number, task, &self.sender) {

@@ -1,13 +1,15 @@
 //! What is to be done for one asset: a value that stands by itself, so that a plan can hold it and another machine do it.
 
-use crate::config::Config;
+use super::limits;
 use crate::config::assets::Asset;
+use crate::config::{Config, Limit};
 use crate::read;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// What is to be done for one asset, as a line of a [plan](super::plan). Everything but `settings` is in it: these stand in a line of their own,
 /// for all assets that have the same.
@@ -31,6 +33,9 @@ pub struct Task {
     #[serde(skip)]
     pub settings: Arc<Settings>,
 }
+
+/// Least time that is given to any mesh where nothing else is asked for.
+const LEAST_TIME: Duration = Duration::from_secs(600);
 
 /// The effective configuration of some assets; shared by all that have the same.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -83,12 +88,38 @@ impl Task {
         Self::new(&asset, &self.settings)
     }
 
-    /// Most memory that building it is expected to take, bytes; see [`limits::estimate`](super::limits::estimate).
+    /// Most memory that building it is expected to take, bytes; see [`limits::estimate`].
     #[must_use]
     pub fn memory(&self) -> u64 {
         match self.settings.config.run.memory {
-            0 => super::limits::estimate(self.cost, &self.settings.config),
-            cap => cap,
+            Limit::At(cap) => cap,
+            Limit::Auto | Limit::Off => limits::estimate(self.cost, &self.settings.config),
+        }
+    }
+
+    /// Most memory that its process may take, bytes, where `free` bytes are there for `jobs` processes; none: any.
+    #[must_use]
+    pub fn memory_limit(&self, free: Option<u64>, jobs: usize) -> Option<u64> {
+        match self.settings.config.run.memory {
+            Limit::At(cap) => Some(cap),
+            Limit::Off => None,
+            Limit::Auto => {
+                let share = free? / jobs.max(1) as u64;
+                Some(share.max(self.memory().saturating_mul(2)))
+            }
+        }
+    }
+
+    /// Most time that its process may take; none: any.
+    #[must_use]
+    pub fn time_limit(&self) -> Option<Duration> {
+        match self.settings.config.run.timeout {
+            Limit::At(seconds) => Some(Duration::from_secs(seconds)),
+            Limit::Off => None,
+            Limit::Auto => {
+                let expected = limits::expected_time(self.cost, &self.settings.config, true);
+                Some(LEAST_TIME.saturating_add(Duration::from_millis(expected).saturating_mul(100)))
+            }
         }
     }
 }

@@ -7,18 +7,22 @@ use super::shard::Shard;
 use super::task::Settings;
 use super::worker::Voice;
 use super::{Batch, Task, Watcher, run, run_shard};
-use crate::config::Config;
+use crate::config::{Config, Limit};
 use crate::outcome::{AssetOutcome, AssetState, FailureKind};
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Of this size, with this memory cap and timeout.
+/// Of this size, with this memory cap and timeout; 0 for none.
 fn task(id: &str, cost: u64, memory: u64, timeout: u64) -> Task {
     let mut config = Config::default();
-    config.run.memory = memory;
-    config.run.timeout = timeout;
+    let limit = |amount| match amount {
+        0 => Limit::Off,
+        amount => Limit::At(amount),
+    };
+    config.run.memory = limit(memory);
+    config.run.timeout = limit(timeout);
     let settings = Arc::new(Settings::new(config));
     Task {
         id: id.into(),
@@ -123,6 +127,32 @@ fn jobs_and_memory_bound_how_many_run() {
 }
 
 #[test]
+fn without_settings_the_machine_is_protected() {
+    let task = |cost, memory, timeout| {
+        let mut task = task("a", cost, 0, 0);
+        let mut config = Config::default();
+        (config.run.memory, config.run.timeout) = (memory, timeout);
+        task.settings = Arc::new(Settings::new(config));
+        task
+    };
+    let auto = task(1 << 20, Limit::Auto, Limit::Auto);
+    // Its share, but never less than what it may well need, and nothing where the system does not tell.
+    assert_eq!(auto.memory_limit(Some(64 << 30), 4), Some(16 << 30));
+    assert_eq!(auto.memory_limit(Some(1 << 20), 4), Some(2 * auto.memory()));
+    assert_eq!(auto.memory_limit(None, 4), None);
+    let seconds = auto.time_limit().unwrap().as_secs();
+    assert!((900..3_600).contains(&seconds), "{seconds}");
+    let large = task(1 << 30, Limit::Auto, Limit::Auto);
+    assert!(large.time_limit().unwrap().as_secs() > 100 * seconds);
+    let off = task(1, Limit::Off, Limit::Off);
+    assert_eq!(off.memory_limit(Some(1 << 30), 1), None);
+    assert_eq!(off.time_limit(), None);
+    let given = task(1, Limit::At(5), Limit::At(7));
+    assert_eq!(given.memory_limit(Some(1 << 30), 1), Some(5));
+    assert_eq!(given.time_limit().unwrap().as_secs(), 7);
+}
+
+#[test]
 fn every_end_has_its_kind_and_the_others_go_on() {
     let script = format!(
         r#"case $1 in
@@ -132,6 +162,7 @@ fn every_end_has_its_kind_and_the_others_go_on() {
         stack) echo "thread 'main' has overflowed its stack" >&2; kill -ABRT $$;;
         slow) read job; exec sleep 30;;
         silent) exit 3;;
+        grown) read job; kill -XFSZ $$;;
         garbage) echo 'no JSON'; echo '{{"event":"finished"}}'; exit 0;;
         *) {BUILDS};;
         esac"#
@@ -144,6 +175,7 @@ fn every_end_has_its_kind_and_the_others_go_on() {
         "stack",
         "slow",
         "silent",
+        "grown",
         "garbage",
         "good",
     ];
@@ -189,6 +221,7 @@ fn every_end_has_its_kind_and_the_others_go_on() {
         ("stack", FailureKind::Internal, "stack overflow"),
         ("slow", FailureKind::Timeout, "the 1 s of run.timeout"),
         ("silent", FailureKind::Internal, "exit code 3"),
+        ("grown", FailureKind::Output, "ulimit -f"),
         ("garbage", FailureKind::Internal, "exit code 0"),
     ] {
         let failure = of(id);
@@ -296,6 +329,7 @@ fn a_worker_that_an_engine_ends_with_the_run_is_cancelled_and_one_that_is_killed
             output: root.path(),
             plan: None,
             threads: 1,
+            memory: None,
             voice: Voice::default(),
         };
         let (sender, receiver) = std::sync::mpsc::channel();

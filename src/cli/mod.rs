@@ -27,7 +27,7 @@ mod verify;
 pub mod work;
 mod worker;
 
-use arguments::{Arguments, Command};
+use arguments::{Arguments, Command, LogFormat};
 use clap::Parser;
 use problem::Problem;
 use std::process::ExitCode;
@@ -52,9 +52,16 @@ mod exit {
 /// Runs the command and gives its exit code; never panics.
 pub fn main(work: &Work) -> ExitCode {
     terminal::decide_colours();
-    // Wrong arguments end here with exit code 2, `--help` and `--version` with 0.
-    let arguments = Arguments::parse();
     panics::keep_quiet();
+    // Wrong arguments end here with exit code 2, `--help` and `--version` with 0.
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(message) => {
+            terminal::note(message.print());
+            let code = u8::try_from(message.exit_code()).unwrap_or(exit::USAGE);
+            return ExitCode::from(printed(code, LogFormat::Text));
+        }
+    };
     if let Command::Worker(worker) = &arguments.command {
         return worker::run(worker, work);
     }
@@ -71,7 +78,19 @@ pub fn main(work: &Work) -> ExitCode {
         }
     };
     interrupt::finish();
-    ExitCode::from(code)
+    ExitCode::from(printed(code, arguments.global.log_format))
+}
+
+/// The exit code, after a message where results could not be written to standard output.
+fn printed(code: u8, format: LogFormat) -> u8 {
+    let Some(error) = terminal::unwritten() else {
+        return code;
+    };
+    let problem = Problem::NotPrinted {
+        reason: error.to_string(),
+    };
+    problem.show(format);
+    code.max(problem.exit_code())
 }
 
 fn run(arguments: &Arguments, work: &Work) -> Result<u8, Problem> {

@@ -48,6 +48,8 @@ pub enum Problem {
     NotWritten { path: PathBuf, reason: String },
     #[error("{} cannot be written: {reason}", path.display())]
     NotRecorded { path: PathBuf, reason: String },
+    #[error("standard output cannot be written: {reason}")]
+    NotPrinted { reason: String },
     #[error("{} does not end in .glb, the only format that meshes are written in", path.display())]
     NotGlb { path: PathBuf },
     #[error("{} does not end in the name of a folder to write", path.display())]
@@ -65,7 +67,9 @@ impl Problem {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::NoInputs | Self::NothingFound { .. } => exit::NOTHING_TO_DO,
-            Self::NotRecorded { .. } | Self::NotDone { .. } => exit::SOME_FAILED,
+            Self::NotRecorded { .. } | Self::NotDone { .. } | Self::NotPrinted { .. } => {
+                exit::SOME_FAILED
+            }
             Self::Internal(_) => exit::INTERNAL,
             _ => exit::USAGE,
         }
@@ -96,6 +100,7 @@ impl Problem {
             Self::NotWritten { .. } | Self::NotRecorded { .. } => {
                 "check that its folder exists, may be written and has space left"
             }
+            Self::NotPrinted { .. } => "check that there is space where it goes, and run it again",
             Self::NotGlb { .. } => "name the file with `--out MESH.glb`",
             Self::NoName { .. } => "name it with `--out FOLDER`",
             Self::NoFolder { .. } => "name a folder that `affine-atlas build` wrote",

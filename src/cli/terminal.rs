@@ -1,7 +1,8 @@
 //! What the terminal can show.
 
 use console::Term;
-use std::io::Write;
+use std::io::{self, ErrorKind, Write};
+use std::sync::OnceLock;
 
 /// Columns of text that is not shown on a terminal.
 const FILE_WIDTH: usize = 100;
@@ -39,13 +40,30 @@ fn width(term: &Term) -> Option<usize> {
     )
 }
 
-/// Writes to standard output. A reader that has gone away (`affine-atlas … | head`) is no error.
+/// Why something could not be written to standard output.
+static UNWRITTEN: OnceLock<io::Error> = OnceLock::new();
+
+/// Writes to standard output. A reader that has gone away (`affine-atlas … | head`) is no error; of any other failure [`unwritten`] tells.
 pub fn print(text: &str) {
-    let mut out = std::io::stdout().lock();
-    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    let mut out = io::stdout().lock();
+    note(out.write_all(text.as_bytes()).and_then(|()| out.flush()));
 }
 
-/// Writes to standard error, likewise.
+/// Notes how writing to standard output went.
+pub fn note(written: io::Result<()>) {
+    if let Err(error) = written
+        && error.kind() != ErrorKind::BrokenPipe
+    {
+        let _ = UNWRITTEN.set(error);
+    }
+}
+
+/// Why something could not be written to standard output, if so.
+pub fn unwritten() -> Option<&'static io::Error> {
+    UNWRITTEN.get()
+}
+
+/// Writes to standard error, where a failure could be told to nobody.
 pub fn print_error(text: &str) {
     let mut out = std::io::stderr().lock();
     let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());

@@ -2,6 +2,7 @@
 
 use super::error::ConfigError;
 use super::keys::{self, Kind};
+use super::limit::Limit;
 use super::scope::OF_THE_RUN;
 use super::source::Source;
 use crate::flow::cones::PiMultiple;
@@ -135,6 +136,13 @@ fn check_value(
                 errors.push(out_of_range(given.as_str()));
             }
         }
+        (Kind::Limit(max), DeValue::Integer(given)) => {
+            let number = i64::from_str_radix(given.as_str(), given.radix());
+            if !number.is_ok_and(|number| (1..=max).contains(&number)) {
+                errors.push(out_of_range(given.as_str()));
+            }
+        }
+        (Kind::Limit(_), DeValue::String(given)) if Limit::WORDS.contains(&&**given) => {}
         (Kind::CurvatureIn { min, below }, DeValue::String(given)) => {
             // A text that is no curvature is left to the type, which says what is wrong with it.
             if let Ok(curvature) = given.parse::<PiMultiple>()

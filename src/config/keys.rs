@@ -19,6 +19,8 @@ pub enum Kind {
         /// Greatest value.
         max: i64,
     },
+    /// `"auto"`, `"off"`, or an integer from 1 to this.
+    Limit(i64),
     /// A finite number in a range; integers are accepted.
     Number {
         /// Least value.
@@ -63,6 +65,7 @@ impl fmt::Display for Kind {
         match self {
             Self::Bool => write!(f, "true or false"),
             Self::Integer { min, max } => write!(f, "an integer from {min} to {max}"),
+            Self::Limit(max) => write!(f, "\"auto\", \"off\", or an integer from 1 to {max}"),
             Self::Number { min, max } => write!(f, "a number from {min:?} to {max:?}"),
             Self::ZeroOr { min, max } => write!(f, "0.0, or a number from {min:?} to {max:?}"),
             Self::Choice(words) | Self::Choices(words) => {
@@ -508,22 +511,11 @@ pub const KEYS: &[Key] = &[
     ),
     key(
         "run.timeout",
-        Kind::Integer {
-            min: 0,
-            max: 31_536_000,
-        },
+        Kind::Limit(31_536_000),
         "seconds",
-        "0",
+        "\"auto\"",
     ),
-    key(
-        "run.memory",
-        Kind::Integer {
-            min: 0,
-            max: 1 << 44,
-        },
-        "bytes",
-        "0",
-    ),
+    key("run.memory", Kind::Limit(1 << 44), "bytes", "\"auto\""),
     key(
         "run.total_memory",
         Kind::Integer {

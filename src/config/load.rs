@@ -6,7 +6,8 @@ use super::layers::{Layers, merge, parse_layer};
 use super::overrides::Override;
 use super::source::Source;
 use crate::flow::cones;
-use std::io::Read;
+use crate::read::bounded::read_bounded;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use toml::de::DeTable;
@@ -189,23 +190,17 @@ fn read_text(path: &Path) -> Result<String, ConfigError> {
         path: path.to_owned(),
         reason,
     };
-    let file = std::fs::File::open(path).map_err(|error| match error.kind() {
-        std::io::ErrorKind::NotFound => ConfigError::NotFound {
+    let bytes = read_bounded(path, MAX_BYTES).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => ConfigError::NotFound {
             path: path.to_owned(),
+        },
+        ErrorKind::FileTooLarge => ConfigError::TooLong {
+            path: path.to_owned(),
+            bytes: std::fs::metadata(path).map_or(MAX_BYTES + 1, |data| data.len()),
+            limit: MAX_BYTES,
         },
         _ => unreadable(error.to_string()),
     })?;
-    let mut bytes = Vec::new();
-    file.take(MAX_BYTES + 1)
-        .read_to_end(&mut bytes)
-        .map_err(|error| unreadable(error.to_string()))?;
-    if bytes.len() as u64 > MAX_BYTES {
-        return Err(ConfigError::TooLong {
-            path: path.to_owned(),
-            bytes: std::fs::metadata(path).map_or(bytes.len() as u64, |data| data.len()),
-            limit: MAX_BYTES,
-        });
-    }
     String::from_utf8(bytes).map_err(|error| {
         unreadable(format!(
             "byte {} is not UTF-8 text",

@@ -13,6 +13,7 @@ mod check;
 pub mod error;
 pub mod keys;
 mod layers;
+mod limit;
 mod load;
 mod overrides;
 mod presets;
@@ -21,6 +22,7 @@ mod sections;
 mod source;
 
 pub use error::{ConfigError, Location};
+pub use limit::Limit;
 pub use load::{Loaded, defaults, load, parse};
 pub use overrides::Override;
 pub use presets::Preset;

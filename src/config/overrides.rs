@@ -118,6 +118,7 @@ pub(super) fn take(
 mod tests {
     use super::super::load::parse_layers;
     use super::*;
+    use crate::config::Limit;
     use crate::flow::ricci::Scheme;
 
     fn config_of(text: &str, set: &[&str], given: &str) -> Config {
@@ -159,8 +160,9 @@ run.timeout = 7
         );
         let config = config_of(TEXT, &[], "one.obj");
         assert_eq!(config.cones.quantum, "1/2".parse().unwrap());
-        assert_eq!(config.run.timeout, 7);
-        assert_eq!(config_of(TEXT, &[], "other/one.obj").run.timeout, 0);
+        assert_eq!(config.run.timeout, Limit::At(7));
+        let other = config_of(TEXT, &[], "other/one.obj");
+        assert_eq!(other.run.timeout, Limit::Auto);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 //!
 //! Most are the stages' own parameters; `[input]`, `[output]`, `[pictures]` and `[run]` belong here.
 
+use super::Limit;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -66,10 +67,10 @@ pub struct RunParams {
     pub jobs: usize,
     /// Threads of each such process; 0: the cores, shared among them.
     pub threads: usize,
-    /// Most time that a mesh may take, seconds; 0: any.
-    pub timeout: u64,
-    /// Most memory that a mesh may take, bytes; 0: any.
-    pub memory: u64,
+    /// Most time that a mesh may take, seconds; [`Limit::Auto`]: in proportion to the size of its file.
+    pub timeout: Limit,
+    /// Most memory that a mesh may take, bytes; [`Limit::Auto`]: its share of what is free.
+    pub memory: Limit,
     /// Memory of all processes together, bytes, within which jobs are started; 0: what is free when the run begins.
     pub total_memory: u64,
 }

@@ -231,6 +231,15 @@ fn bounds_are_accepted_and_beyond_is_refused() {
                     "99999999999999999999".to_owned(),
                 ],
             ),
+            Kind::Limit(max) => (
+                vec![
+                    "1".into(),
+                    max.to_string(),
+                    "\"auto\"".into(),
+                    "\"off\"".into(),
+                ],
+                vec!["0".into(), "-1".into(), (max + 1).to_string()],
+            ),
             Kind::CurvatureIn { min, below } => (
                 vec![format!("{min:?}"), format!("{}/1000", 1000.0 * below - 1.0)],
                 vec![
@@ -458,7 +467,7 @@ fn hash_depends_on_values_that_change_a_result() {
         let section = key.path.split('.').next().expect("section");
         let value = match key.kind {
             Kind::Bool => (key.default != "true").to_string(),
-            Kind::Integer { max, .. } => max.to_string(),
+            Kind::Integer { max, .. } | Kind::Limit(max) => max.to_string(),
             Kind::Number { max, .. } | Kind::ZeroOr { max, .. } => format!("{max:?}"),
             Kind::Choice(words) => words[words.len() - 1].to_owned(),
             Kind::Choices(words) => format!("[\"{}\"]", words[0]),

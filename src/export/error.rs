@@ -49,6 +49,15 @@ pub enum ExportError {
         /// What the encoder said.
         message: String,
     },
+    /// A path that a text file would have to name.
+    #[error(
+        "the path {} is no Unicode text, and a configuration holds nothing else; rename the file and its folders",
+        path.display()
+    )]
+    NotUnicode {
+        /// The path.
+        path: PathBuf,
+    },
     /// The asset's name is no name of a folder.
     #[error(
         "the asset name {name:?} cannot be a folder name; rename the input so that its name is not empty, does not begin with a dot and holds no slash"

@@ -5,9 +5,9 @@
 
 use crate::export::{Action, ExportError, folder, names};
 use crate::outcome::{AssetOutcome, AssetState, FailureKind};
+use crate::read::bounded::{JSON_LIMIT, open_regular, read_bounded};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::Path;
 
@@ -122,7 +122,7 @@ impl Manifest {
     /// that are no records, such as those of another version: they are lost with the next [`Manifest::save`].
     pub fn load(output_root: &Path) -> Result<(Manifest, Vec<usize>), ExportError> {
         let path = output_root.join(FILE_NAME);
-        let bytes = match fs::read(&path) {
+        let bytes = match read_bounded(&path, JSON_LIMIT) {
             Ok(bytes) => bytes,
             Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
             Err(error) => return Err(ExportError::io(Action::Read, &path)(error)),
@@ -182,8 +182,8 @@ impl Manifest {
     /// step. The older records are not held in memory, however many they are: their lines are copied, but for those that are no records.
     pub fn update(output_root: &Path, newer: &BTreeMap<String, Record>) -> Result<(), ExportError> {
         let path = output_root.join(FILE_NAME);
-        let older: Box<dyn BufRead> = match File::open(&path) {
-            Ok(file) => Box::new(BufReader::new(file)),
+        let older: Box<dyn BufRead> = match open_regular(&path) {
+            Ok((file, _)) => Box::new(BufReader::new(file)),
             Err(error) if error.kind() == io::ErrorKind::NotFound => Box::new(io::empty()),
             Err(error) => return Err(ExportError::io(Action::Read, &path)(error)),
         };
@@ -263,6 +263,7 @@ fn merge(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     fn record(id: &str, state: State) -> Record {
         Record {

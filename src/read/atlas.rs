@@ -8,15 +8,13 @@
 //! arrays of seams have lengths that fit each other.
 //! *Not guaranteed:* finite numbers, patches in range, and that seams bound patches.
 
-use super::bounded::{is_inside, read_bounded};
+use super::bounded::{JSON_LIMIT, is_inside, read_bounded};
 use super::exr::{self, Read};
 use super::npz::Npz;
 use rayon::prelude::*;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// Largest `atlas.json` that is read (bytes).
-const JSON_LIMIT: u64 = 1 << 30;
 /// Version of the output format (`docs/format.md`) that is understood.
 const VERSION: u64 = 1;
 
@@ -314,7 +312,7 @@ pub(super) fn checked_json(path: &Path) -> Result<serde_json::Value, FolderError
         path: path.to_owned(),
         problem,
     };
-    let bytes = read_bounded(path, JSON_LIMIT).map_err(of_file)?;
+    let bytes = read_bounded(path, JSON_LIMIT).map_err(|e| of_file(e.to_string()))?;
     let value: serde_json::Value =
         serde_json::from_slice(&bytes).map_err(|e| of_file(e.to_string()))?;
     let head = Head::deserialize(&value).map_err(|e| of_file(e.to_string()))?;

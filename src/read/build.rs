@@ -1,7 +1,8 @@
 //! The soup under construction: limits, finite positions, corner attributes that not every face has.
 
 use super::ReadParams;
-use super::error::{Place, ReadProblem};
+use super::budget::Budget;
+use super::error::{Place, ReadProblem, shorten};
 use crate::geometry::ids::NONE;
 use crate::geometry::mesh::{AttributeKind, CornerAttribute, Part, Soup};
 
@@ -11,6 +12,7 @@ const MAX_NOTES: usize = 64;
 /// Collects vertices, triangles and attributes; refuses what exceeds the limits.
 pub(super) struct SoupBuilder {
     pub soup: Soup,
+    pub budget: Budget,
     notes: Vec<String>,
     max_vertices: u64,
     max_faces: u64,
@@ -22,6 +24,7 @@ impl SoupBuilder {
         let ids = u64::from(NONE) - 1;
         Self {
             soup: Soup::default(),
+            budget: Budget::new(params.max_file_bytes),
             notes: Vec::new(),
             max_vertices: params.max_vertices.min(ids),
             max_faces: params.max_faces.min(ids),
@@ -123,11 +126,22 @@ impl SoupBuilder {
     }
 
     /// Spreads a value a vertex over the corners of all faces so far.
-    pub fn vertex_attribute(&mut self, kind: AttributeKind, components: usize, values: &[f32]) {
+    pub fn vertex_attribute(
+        &mut self,
+        kind: AttributeKind,
+        components: usize,
+        values: &[f32],
+    ) -> Result<(), ReadProblem> {
+        let bytes = (12 * components as u64).saturating_mul(self.soup.faces.len() as u64);
+        self.budget.unpack(bytes, || match &kind {
+            AttributeKind::Custom(name) => format!("the attribute {}", shorten(name.as_bytes())),
+            known => format!("the attribute {known:?}"),
+        })?;
         let corners = self.soup.faces.iter().flatten();
         let row = |&v: &u32| &values[v as usize * components..(v as usize + 1) * components];
         let values = corners.flat_map(row).copied().collect();
         self.attribute_values(kind, components, values);
+        Ok(())
     }
 
     /// The finished soup and its notes.

@@ -105,6 +105,20 @@ pub enum ReadProblem {
         /// The limit.
         limit: u64,
     },
+    /// More unpacked than the size of the files warrants.
+    #[error(
+        "{what} would make the asset unpack to {bytes} bytes, more than the {limit} that are granted for {files} bytes of files; store values plainly and once instead of sparse, repeated or compressed, or split the asset"
+    )]
+    TooMuchUnpacked {
+        /// What is being unpacked.
+        what: String,
+        /// Unpacked bytes in all.
+        bytes: u64,
+        /// The limit.
+        limit: u64,
+        /// Bytes of all files.
+        files: u64,
+    },
     /// More vertices than allowed.
     #[error(
         "has {count} vertices or more, beyond max_vertices = {limit}; raise the limit or simplify the mesh"

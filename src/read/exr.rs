@@ -12,9 +12,13 @@ use std::path::Path;
 
 /// Largest image file that is read (bytes).
 const SIZE_LIMIT: u64 = 1 << 32;
-/// No lossless compression of the format makes data smaller than this; an image that claims more texels
-/// than its file can hold is refused before anything is allocated for it.
-const BEST_COMPRESSION: u64 = 1100;
+
+/// Bytes of channels that a file of so many may claim: no lossless compression of the format makes data smaller than by
+/// 1100, and what is large and not plain is not made smaller than by 64.
+fn claimable(bytes: u64) -> u64 {
+    let any = bytes.saturating_mul(1100);
+    any.min(bytes.saturating_mul(64).saturating_add(512 << 20))
+}
 
 /// The channels of an image.
 pub(crate) struct Image {
@@ -44,7 +48,7 @@ pub(crate) enum Read {
 
 /// Reads an image of the size (columns, rows) that is stated elsewhere.
 pub(crate) fn read(path: &Path, size: [usize; 2]) -> Result<Read, String> {
-    let bytes = read_bounded(path, SIZE_LIMIT)?;
+    let bytes = read_bounded(path, SIZE_LIMIT).map_err(|error| error.to_string())?;
     // The decoder is not ours: should it panic on hostile bytes, that is an unreadable image.
     let decoded = std::panic::catch_unwind(|| decode(&bytes, size));
     decoded.unwrap_or_else(|_| Err("cannot be decoded".to_owned()))
@@ -73,9 +77,11 @@ fn decode(bytes: &[u8], [width, height]: [usize; 2]) -> Result<Read, String> {
     let channels = header.channels.list.len() as u64;
     let texels = (width as u64).saturating_mul(height as u64);
     let claimed = texels.saturating_mul(4 * channels);
-    if claimed > BEST_COMPRESSION.saturating_mul(bytes.len() as u64) {
+    let limit = claimable(bytes.len() as u64);
+    if claimed > limit {
         return Err(format!(
-            "claims {texels} texels, more than its bytes can hold"
+            "claims {texels} texels of {channels} channels, {claimed} bytes, more than the {limit} that its {} bytes may stand for",
+            bytes.len()
         ));
     }
     let lossless = matches!(

@@ -5,9 +5,10 @@
 //! fingerprints mean that [`read`](super::read()) meets the same bytes.
 //! Memory is bounded by the JSON of a glTF file; everything else streams through the hash.
 
+use super::bounded::open_regular;
 use super::{Format, format_of, gltf};
 use std::collections::BTreeSet;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
@@ -27,13 +28,7 @@ pub struct Fingerprint {
 /// # Errors
 /// Where the file itself cannot be read. One that it refers to and that is missing, or lies outside its folder, is hashed as missing.
 pub fn fingerprint(path: &Path) -> io::Result<Fingerprint> {
-    if !fs::metadata(path)?.is_file() {
-        return Err(io::Error::new(
-            io::ErrorKind::InvalidInput,
-            "no regular file",
-        ));
-    }
-    let mut file = File::open(path)?;
+    let (mut file, _) = open_regular(path)?;
     let (hash, mut bytes) = hash_of(&mut file)?;
     let mut files = vec![path.to_owned()];
     let named = match format_of(path) {
@@ -79,10 +74,10 @@ fn hash_of(file: &mut File) -> io::Result<(blake3::Hash, u64)> {
 /// Hash and length of a file in a folder, links followed.
 fn referenced(folder: &Path, name: &str) -> io::Result<(blake3::Hash, u64)> {
     let path = folder.join(name).canonicalize()?;
-    if !path.starts_with(folder) || !fs::metadata(&path)?.is_file() {
+    if !path.starts_with(folder) {
         return Err(io::ErrorKind::NotFound.into());
     }
-    hash_of(&mut File::open(path)?)
+    hash_of(&mut open_regular(&path)?.0)
 }
 
 /// The files that a glTF or GLB file names. One whose JSON is broken names none: reading it is refused.
@@ -120,6 +115,7 @@ fn json_chunk(file: &mut File) -> io::Result<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     fn gltf(uris: &[&str]) -> String {
         let list: Vec<String> = uris

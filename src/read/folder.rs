@@ -1,8 +1,10 @@
-//! Which files may be read: the asset itself and what lies in its folder, up to a number of bytes.
+//! Which files may be read: the asset itself and what lies in its folder, within its budget.
 
+use super::bounded::open_regular;
+use super::budget::Budget;
 use super::error::{ReadProblem, shorten};
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -17,13 +19,11 @@ pub(super) struct Folder {
     /// Referenced files by resolved path: a file that is named twice is read once.
     loaded: BTreeMap<PathBuf, Rc<Vec<u8>>>,
     hashes: Vec<blake3::Hash>,
-    bytes: u64,
-    limit: u64,
 }
 
 impl Folder {
     /// Reads the asset's main file.
-    pub fn open(path: &Path, limit: u64) -> Result<(Self, Vec<u8>), ReadProblem> {
+    pub fn open(path: &Path, budget: &mut Budget) -> Result<(Self, Vec<u8>), ReadProblem> {
         let io = |source| ReadProblem::Io { source };
         let shown = path.parent().unwrap_or(Path::new("")).to_path_buf();
         let parent = if shown.as_os_str().is_empty() {
@@ -37,49 +37,31 @@ impl Folder {
             files: Vec::new(),
             loaded: BTreeMap::new(),
             hashes: Vec::new(),
-            bytes: 0,
-            limit,
         };
-        let bytes = folder.load(path, path.to_path_buf())?;
+        let bytes = folder.load(path, path.to_path_buf(), budget)?;
         Ok((folder, bytes))
     }
 
     /// An asset that stands alone in memory.
-    pub fn in_memory(name: &Path, bytes: &[u8], limit: u64) -> Result<Self, ReadProblem> {
-        let mut folder = Self {
+    pub fn in_memory(name: &Path, bytes: &[u8], budget: &mut Budget) -> Result<Self, ReadProblem> {
+        budget.read(bytes.len() as u64, || name.display().to_string())?;
+        Ok(Self {
             root: None,
             shown: PathBuf::new(),
             files: vec![name.to_path_buf()],
             loaded: BTreeMap::new(),
             hashes: vec![blake3::hash(bytes)],
-            bytes: 0,
-            limit,
-        };
-        folder.charge(bytes.len() as u64, || name.display().to_string())?;
-        Ok(folder)
-    }
-
-    /// Counts bytes that are about to be read or unpacked.
-    pub fn charge(&mut self, bytes: u64, what: impl Fn() -> String) -> Result<(), ReadProblem> {
-        self.bytes = self.bytes.saturating_add(bytes);
-        if self.bytes > self.limit {
-            return Err(ReadProblem::TooManyBytes {
-                what: what(),
-                bytes: self.bytes,
-                limit: self.limit,
-            });
-        }
-        Ok(())
-    }
-
-    /// What is left of the byte budget.
-    pub fn budget(&self) -> u64 {
-        self.limit - self.bytes.min(self.limit)
+        })
     }
 
     /// A file that the asset refers to by a relative path, which must lie in the asset's folder after
     /// symbolic links are followed.
-    pub fn referenced(&mut self, uri: &str, path: &str) -> Result<Rc<Vec<u8>>, ReadProblem> {
+    pub fn referenced(
+        &mut self,
+        uri: &str,
+        path: &str,
+        budget: &mut Budget,
+    ) -> Result<Rc<Vec<u8>>, ReadProblem> {
         let referenced = |source| ReadProblem::ReferencedFile {
             uri: shorten(uri.as_bytes()),
             source,
@@ -100,7 +82,7 @@ impl Folder {
         }
         let shown = self.shown.join(path);
         let bytes = self
-            .load(&resolved, shown)
+            .load(&resolved, shown, budget)
             .map_err(|problem| match problem {
                 ReadProblem::Io { source } => referenced(source),
                 ReadProblem::NotAFile => referenced(io::Error::new(
@@ -114,16 +96,18 @@ impl Folder {
         Ok(bytes)
     }
 
-    fn load(&mut self, path: &Path, shown: PathBuf) -> Result<Vec<u8>, ReadProblem> {
+    fn load(
+        &mut self,
+        path: &Path,
+        shown: PathBuf,
+        budget: &mut Budget,
+    ) -> Result<Vec<u8>, ReadProblem> {
         let io = |source| ReadProblem::Io { source };
-        // Asked before opening: opening a pipe or device could block for ever.
-        let size = fs::metadata(path).map_err(io)?;
-        if !size.is_file() {
-            return Err(ReadProblem::NotAFile);
-        }
-        let size = size.len();
-        self.charge(size, || shown.display().to_string())?;
-        let file = File::open(path).map_err(io)?;
+        let (file, size) = open_regular(path).map_err(|source| match source.kind() {
+            io::ErrorKind::InvalidInput => ReadProblem::NotAFile,
+            _ => io(source),
+        })?;
+        budget.read(size, || shown.display().to_string())?;
         let mut bytes = Vec::with_capacity(usize::try_from(size).unwrap_or(0));
         // A file that grows while it is read stays within what was counted.
         file.take(size).read_to_end(&mut bytes).map_err(io)?;

@@ -6,13 +6,14 @@
 //!
 //! Guaranteed for every input, hostile ones included: nothing panics; no byte outside the file's own
 //! folder is read; counts are checked against the file's size and against [`ReadParams`] before memory
-//! is set aside for them; every position is finite and every index in range. Not guaranteed: anything
+//! is set aside for them, and what files unpack to stays in proportion to their size; every position is finite and every index in range. Not guaranteed: anything
 //! about the surface (manifoldness, orientation, duplicates), which is repair's business.
 //!
 //! | module | what it knows |
 //! | --- | --- |
 //! | `error` | what can be wrong with a file |
-//! | `folder` | which files may be read, how many bytes, and their hash |
+//! | `budget` | how many bytes files and what they unpack to may take |
+//! | `folder` | which files may be read, and their hash |
 //! | `fingerprint` | hash of a file and all that it refers to, without decoding any |
 //! | `build` | the soup under construction and its limits |
 //! | `text` | lines, tokens and numbers of text formats |
@@ -28,6 +29,7 @@
 
 pub mod atlas;
 pub(crate) mod bounded;
+mod budget;
 mod build;
 mod error;
 pub(crate) mod exr;
@@ -63,8 +65,8 @@ pub struct ReadParams {
     pub max_vertices: u64,
     /// Largest number of triangles; instances of a mesh count each. 1 to 2³² − 2.
     pub max_faces: u64,
-    /// Largest number of bytes in all: the file, those it refers to, and what glTF's compressed parts, lists and
-    /// corner attributes unpack to.
+    /// Largest number of bytes in all: the file, those it refers to, and what they unpack to. What they unpack to may besides be
+    /// no more than 128 MiB and 256 bytes for each byte of the files.
     pub max_file_bytes: u64,
 }
 
@@ -127,8 +129,9 @@ pub fn read(path: &Path, params: &ReadParams) -> Result<SourceAsset, ReadError> 
             return Err(ReadProblem::NotAFile);
         }
         let format = format_of(path)?;
-        let (folder, bytes) = Folder::open(path, params.max_file_bytes)?;
-        parse(format, &bytes, folder, params)
+        let mut build = SoupBuilder::new(params);
+        let (folder, bytes) = Folder::open(path, &mut build.budget)?;
+        parse(format, &bytes, folder, build)
     };
     run().map_err(|problem| ReadError::new(path, problem))
 }
@@ -145,8 +148,9 @@ pub fn read_bytes(
 ) -> Result<SourceAsset, ReadError> {
     let run = || {
         let format = format_of(name)?;
-        let folder = Folder::in_memory(name, bytes, params.max_file_bytes)?;
-        parse(format, bytes, folder, params)
+        let mut build = SoupBuilder::new(params);
+        let folder = Folder::in_memory(name, bytes, &mut build.budget)?;
+        parse(format, bytes, folder, build)
     };
     run().map_err(|problem| ReadError::new(name, problem))
 }
@@ -155,9 +159,8 @@ fn parse(
     format: Format,
     bytes: &[u8],
     mut folder: Folder,
-    params: &ReadParams,
+    mut build: SoupBuilder,
 ) -> Result<SourceAsset, ReadProblem> {
-    let mut build = SoupBuilder::new(params);
     match format {
         Format::Obj => obj::read_obj(bytes, &mut build)?,
         Format::Off => off::read_off(bytes, &mut build)?,

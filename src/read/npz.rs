@@ -1,8 +1,10 @@
 //! A bounded reader of `.npz`: a zip container of NumPy arrays.
 //!
 //! Only what the output format (`docs/format.md`) uses: little-endian f64 and u32, u8, C order. The header's shape must agree
-//! with the entry's size before anything is read, and memory grows only with data that is really there.
+//! with the entry's size before anything is read, memory grows only with data that is really there, and all arrays together
+//! unpack to no more than [`unpacked_limit`] grants for the size of the container.
 
+use super::bounded::{open_regular, unpacked_limit};
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -10,6 +12,9 @@ use zip::ZipArchive;
 
 /// Longest header that is read (NumPy writes less than 200 bytes for arrays like ours).
 const HEADER_LIMIT: usize = 1 << 16;
+
+/// Bytes that the arrays of any container may unpack to.
+const FLOOR: u64 = 64 << 20;
 
 /// A number type of the format.
 pub(crate) trait Element: Copy {
@@ -44,13 +49,22 @@ element!(u8, "uint8", "|u1", "<u1", "u1");
 /// An open container.
 pub(crate) struct Npz {
     archive: ZipArchive<BufReader<File>>,
+    /// Bytes of the container.
+    size: u64,
+    /// Bytes that its arrays may still unpack to.
+    left: u64,
 }
 
 impl Npz {
     pub fn open(path: &Path) -> Result<Self, String> {
-        let file = File::open(path).map_err(|error| error.to_string())?;
+        let (file, size) = open_regular(path).map_err(|error| error.to_string())?;
         let archive = ZipArchive::new(BufReader::new(file)).map_err(|error| error.to_string())?;
-        Ok(Self { archive })
+        let left = unpacked_limit(FLOOR, size);
+        Ok(Self {
+            archive,
+            size,
+            left,
+        })
     }
 
     /// Whether an array of that name is there.
@@ -109,6 +123,15 @@ impl Npz {
                 bytes as u64 + header_bytes as u64
             )));
         }
+        let Some(left) = self.left.checked_sub(bytes as u64) else {
+            return Err(at(format!(
+                "unpacks to {bytes} bytes, and the arrays of a container of {} bytes may unpack to {} together, of which {} are left",
+                self.size,
+                unpacked_limit(FLOOR, self.size),
+                self.left
+            )));
+        };
+        self.left = left;
         let mut values = Vec::with_capacity(count.min(1 << 16));
         let mut buffer = vec![0; T::SIZE * (1 << 13)];
         let mut left = bytes;

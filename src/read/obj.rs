@@ -268,7 +268,7 @@ impl Obj {
         if !self.colors.is_empty() {
             if self.colors.len() == build.soup.positions.len() {
                 let colors = self.colors.as_flattened();
-                build.vertex_attribute(AttributeKind::Color(0), 4, colors);
+                build.vertex_attribute(AttributeKind::Color(0), 4, colors)?;
             } else {
                 build.note("vertex colours are skipped because not every vertex has one");
             }

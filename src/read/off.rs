@@ -119,13 +119,13 @@ pub(super) fn read_off(bytes: &[u8], build: &mut SoupBuilder) -> Result<(), Read
         texture,
     } = attributes;
     if layout_found.normal {
-        build.vertex_attribute(AttributeKind::Normal, 3, normals.as_flattened());
+        build.vertex_attribute(AttributeKind::Normal, 3, normals.as_flattened())?;
     }
     if layout_found.color {
-        build.vertex_attribute(AttributeKind::Color(0), 4, colors.as_flattened());
+        build.vertex_attribute(AttributeKind::Color(0), 4, colors.as_flattened())?;
     }
     if layout_found.texture {
-        build.vertex_attribute(AttributeKind::TexCoord(0), 2, texture.as_flattened());
+        build.vertex_attribute(AttributeKind::TexCoord(0), 2, texture.as_flattened())?;
     }
     Ok(())
 }

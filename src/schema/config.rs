@@ -1,9 +1,9 @@
 //! The schema of `config.toml`, so that editors complete and check it.
 
 use super::DRAFT;
-use crate::config::COMMENTED_DEFAULT;
 use crate::config::keys::{KEYS, Key, Kind};
 use crate::config::scope::OF_THE_RUN;
+use crate::config::{COMMENTED_DEFAULT, Limit};
 use serde_json::{Map, Value, json};
 
 /// A curvature as text: a number, a fraction, or an angle in radians.
@@ -117,6 +117,10 @@ fn of_kind(kind: Kind) -> Value {
     match kind {
         Kind::Bool => json!({ "type": "boolean" }),
         Kind::Integer { min, max } => json!({ "type": "integer", "minimum": min, "maximum": max }),
+        Kind::Limit(max) => json!({ "anyOf": [
+            { "enum": Limit::WORDS },
+            { "type": "integer", "minimum": 1, "maximum": max },
+        ]}),
         Kind::Number { min, max } => json!({ "type": "number", "minimum": min, "maximum": max }),
         Kind::ZeroOr { min, max } => json!({ "anyOf": [
             { "const": 0 },

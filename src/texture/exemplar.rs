@@ -8,7 +8,9 @@
 
 use super::ExemplarError;
 use crate::export::pictures::colour::{to_bytes, to_linear};
+use crate::read::bounded::open_regular;
 use image::{ImageReader, RgbaImage};
+use std::io::BufReader;
 use std::path::Path;
 
 /// Most pixels a side.
@@ -80,11 +82,10 @@ impl Exemplar {
             path: path.to_owned(),
             problem: error.to_string(),
         };
-        // A folder or a pipe would be opened, and only fail, or wait, later.
-        if !std::fs::metadata(path).map_err(io)?.is_file() {
-            return Err(io(std::io::Error::other("it is no file")));
-        }
-        let open = || ImageReader::open(path).and_then(ImageReader::with_guessed_format);
+        let open = || {
+            let (file, _) = open_regular(path)?;
+            ImageReader::new(BufReader::new(file)).with_guessed_format()
+        };
         let (width, height) = open().map_err(io)?.into_dimensions().map_err(no_image)?;
         if width.max(height) > SIDE_LIMIT {
             return Err(ExemplarError::TooLarge {

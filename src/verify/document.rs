@@ -2,13 +2,11 @@
 
 use super::Verdicts;
 use super::formulas::{Motion, Point2, Point3};
-use crate::read::bounded::{is_inside, read_bounded};
+use crate::read::bounded::{JSON_LIMIT, is_inside, read_bounded};
 use serde::Deserialize;
 use serde_json::Value;
+use std::collections::HashSet;
 use std::path::Path;
-
-/// Largest `atlas.json` that is read (bytes).
-const SIZE_LIMIT: u64 = 1 << 30;
 
 /// Keys that must be there, by object.
 const KEYS: [(&str, &[&str]); 7] = [
@@ -250,7 +248,8 @@ pub(super) struct Flags {
 }
 
 fn parse(folder: &Path) -> Result<Value, String> {
-    let bytes = read_bounded(&folder.join("atlas.json"), SIZE_LIMIT)?;
+    let path = folder.join("atlas.json");
+    let bytes = read_bounded(&path, JSON_LIMIT).map_err(|error| error.to_string())?;
     serde_json::from_slice(&bytes).map_err(|error| error.to_string())
 }
 
@@ -356,7 +355,12 @@ fn stray_ids(document: &Document) -> Vec<String> {
             ));
         }
     }
+    // One that is named by many would be read for each of them.
+    let mut images = HashSet::new();
     for (row, patch) in document.patches.iter().enumerate() {
+        if !images.insert(patch.image.as_str()) {
+            stray.push(format!("image {:?} of more than one patch", patch.image));
+        }
         if patch.id != row {
             stray.push(format!("patch {} in row {row}", patch.id));
         }

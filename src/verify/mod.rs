@@ -33,7 +33,7 @@ mod source;
 mod surface;
 mod transitions;
 
-use crate::read::bounded::is_inside;
+use crate::read::bounded::{JSON_LIMIT, is_inside, read_bounded};
 use serde::Serialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -216,6 +216,12 @@ fn verify_asset(
     Ok(verdicts)
 }
 
+fn read_manifest(folder: &Path) -> Result<String, String> {
+    let bytes = read_bounded(&folder.join("manifest.jsonl"), JSON_LIMIT);
+    let bytes = bytes.map_err(|error| error.to_string())?;
+    String::from_utf8(bytes).map_err(|error| error.to_string())
+}
+
 /// Every asset that the manifest calls built, or of which it lists files, must be there with them.
 fn verify_manifest(
     folder: &Path,
@@ -223,7 +229,7 @@ fn verify_manifest(
     source: Option<&SourceSurface<'_>>,
     verdicts: &mut Verdicts,
 ) {
-    let text = match std::fs::read_to_string(folder.join("manifest.jsonl")) {
+    let text = match read_manifest(folder) {
         Ok(text) => text,
         Err(error) => {
             verdicts.note("manifest.jsonl can be read", false, error);

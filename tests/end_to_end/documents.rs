@@ -1,9 +1,11 @@
 //! `docs/output.md` describes every key and every array that a build writes, and no others; links in the documents lead somewhere.
 
-use super::arrays::shapes;
 use super::command::{build, document, program};
+use npyz::NpyFile;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 fn root() -> &'static Path {
@@ -287,4 +289,27 @@ fn the_readme_is_short_and_says_what_it_is_for() {
         let there = text.contains(&format!("affine-atlas {command}"));
         assert!(there, "no word of `affine-atlas {command}`");
     }
+}
+
+/// NumPy's name of the type and the shape of every array.
+fn shapes(atlas: &Path) -> BTreeMap<String, (&'static str, Vec<u64>)> {
+    let file = File::open(atlas.join("atlas.npz")).expect("atlas.npz");
+    let mut archive = zip::ZipArchive::new(file).expect("a zip file");
+    let mut found = BTreeMap::new();
+    for i in 0..archive.len() {
+        let mut entry = archive.by_index(i).expect("an entry");
+        let file_name = entry.name().expect("a name").into_owned();
+        let mut bytes = Vec::new();
+        entry.read_to_end(&mut bytes).expect("readable");
+        let array = NpyFile::new(&bytes[..]).expect("a NumPy array");
+        let dtype = match array.dtype().descr().trim_matches('\'') {
+            "<f8" => "float64",
+            "<u4" => "uint32",
+            "|u1" => "uint8",
+            other => panic!("{file_name}: {other}"),
+        };
+        let name = file_name.trim_end_matches(".npy").to_owned();
+        found.insert(name, (dtype, array.shape().to_vec()));
+    }
+    found
 }

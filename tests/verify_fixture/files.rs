@@ -17,7 +17,8 @@ pub struct Npy {
 }
 
 impl Npy {
-    fn file(&self) -> Vec<u8> {
+    /// The bytes of its `.npy`.
+    pub fn file(&self) -> Vec<u8> {
         let shape: Vec<String> = self.shape.iter().map(|n| format!("{n},")).collect();
         let mut header = format!(
             "{{'descr': '{}', 'fortran_order': False, 'shape': ({}), }}",

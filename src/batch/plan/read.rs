@@ -6,6 +6,7 @@ use super::{
 use crate::batch::cache::VERSION;
 use crate::batch::task::Settings;
 use crate::export::folder::is_asset_name;
+use crate::read::bounded::open_regular;
 use serde::Deserialize;
 use std::collections::HashSet;
 use std::fs::File;
@@ -31,7 +32,7 @@ impl Plan {
                 _ => error.to_string(),
             },
         };
-        let file = File::open(path).map_err(unreadable)?;
+        let (file, _) = open_regular(path).map_err(unreadable)?;
         let mut lines = Lines {
             path,
             from: BufReader::new(file),

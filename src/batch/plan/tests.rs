@@ -1,7 +1,7 @@
 use super::*;
 use crate::batch::cache::Reason;
-use crate::config::RunParams;
 use crate::config::assets::Asset;
+use crate::config::{Limit, RunParams};
 
 /// A folder with three meshes and a plan of them, in two configurations.
 struct Made {
@@ -41,7 +41,7 @@ fn made() -> Made {
     config.cones.file_lines = vec![3, 4];
     config.patches.max_count = Some(3);
     config.flow.curvature_tolerance = 0.1 + 0.2;
-    config.run.timeout = 60;
+    config.run.timeout = Limit::At(60);
     let other = Arc::new(Settings::new(config));
     // Equal to the first, but not the same value.
     let again = Arc::new(Settings::new(Config::default()));
@@ -100,7 +100,7 @@ fn a_plan_reads_back_as_it_was() {
     let tasks: Vec<&Task> = back.assets.iter().map(|asset| &asset.task).collect();
     // `Task` compares settings, and with them what no hash holds.
     assert_eq!(tasks[1].settings.config.cones.file_lines, [3, 4]);
-    assert_eq!(tasks[1].settings.config.run.timeout, 60);
+    assert_eq!(tasks[1].settings.config.run.timeout, Limit::At(60));
     assert_eq!(
         tasks[1].settings.flat,
         made.plan.assets[1].task.settings.flat

@@ -80,6 +80,10 @@ impl Recorder {
             if !(name.starts_with("journal-") && name.ends_with(".jsonl")) {
                 continue;
             }
+            // A pipe would wait for ever.
+            if !entry.file_type().is_ok_and(|kind| kind.is_file()) {
+                continue;
+            }
             let Ok(file) = OpenOptions::new().read(true).write(true).open(entry.path()) else {
                 continue;
             };

@@ -12,6 +12,7 @@ use crate::batch::shard::Shard;
 use crate::batch::{Task, limits};
 use crate::export::{Action, ExportError, folder};
 use crate::outcome::{AssetOutcome, AssetState};
+use crate::read::bounded::open_regular;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufRead, BufReader, Write};
@@ -190,7 +191,7 @@ fn read_one(
     plan: &str,
     each: &mut impl FnMut(Finished),
 ) -> io::Result<Option<Attempt>> {
-    let mut lines = BufReader::new(File::open(path)?).split(b'\n');
+    let mut lines = BufReader::new(open_regular(path)?.0).split(b'\n');
     let first = match lines.next() {
         Some(line) => serde_json::from_slice(&line?).ok(),
         None => None,

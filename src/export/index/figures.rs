@@ -1,9 +1,9 @@
 //! The figures of an asset, from the `atlas.json` of its components.
 
 use crate::export::manifest::Record;
+use crate::read::bounded::{JSON_LIMIT, read_bounded};
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
-use std::fs;
 use std::path::Path;
 
 /// Figures of all components together: counts are added up, of the others the worst is taken.
@@ -71,7 +71,7 @@ pub(super) fn read(output_root: &Path, record: &Record) -> Option<Figures> {
     let mut all: Option<Figures> = None;
     for file in documents {
         // A file that is gone or broken says nothing; `verify` is there to find it.
-        let bytes = fs::read(output_root.join(file)).ok()?;
+        let bytes = read_bounded(&output_root.join(file), JSON_LIMIT).ok()?;
         let document: Document = serde_json::from_slice(&bytes).ok()?;
         let sum = all.get_or_insert_default();
         let Quality {

@@ -3,10 +3,11 @@
 use super::figures::Figures;
 use crate::export::manifest::State;
 use crate::export::{Action, ExportError};
+use crate::read::bounded::{JSON_LIMIT, read_bounded};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::io;
 use std::path::Path;
-use std::{fs, io};
 
 /// An asset as a run left it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -28,7 +29,7 @@ pub(super) struct Past {
 
 /// What earlier runs left; nothing where there was none. Lines that are no records, such as those of another version, count as not there.
 pub(super) fn load(path: &Path) -> Result<BTreeMap<String, Past>, ExportError> {
-    let bytes = match fs::read(path) {
+    let bytes = match read_bounded(path, JSON_LIMIT) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
         Err(error) => return Err(ExportError::io(Action::Read, path)(error)),

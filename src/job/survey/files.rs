@@ -54,6 +54,9 @@ pub(super) fn write(
     let name = folder_name(&survey.id);
     let staging = Staging::begin_with(Contents::Cones, output, &name)?;
     let mesh = mesh_from(output, &name, mesh)?;
+    if mesh.to_str().is_none() {
+        return Err(ExportError::NotUnicode { path: mesh });
+    }
     for &count in &counts {
         let choice = Choice::of(survey, count);
         let Some(list) = &choice.list else { continue };

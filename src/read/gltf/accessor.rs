@@ -2,6 +2,7 @@
 
 use super::buffers::{Buffers, lookup, range};
 use super::schema::{Accessor, Root};
+use crate::read::budget::Budget;
 use crate::read::error::{ReadProblem, shorten};
 
 /// Type of one number.
@@ -126,12 +127,13 @@ impl<'a> Values<'a> {
 
     /// All numbers, `components` a value; integers are as stored unless `normalized`.
     ///
-    /// The caller has checked the number of values against the limits.
+    /// Charged each time that it is read.
     pub fn read(
         &self,
         buffers: &Buffers,
         root: &Root,
         normalized: bool,
+        budget: &mut Budget,
     ) -> Result<Vec<f64>, ReadProblem> {
         let Self {
             index,
@@ -149,6 +151,8 @@ impl<'a> Values<'a> {
                 value
             }
         };
+        let numbers = accessor.count.saturating_mul(8 * components as u64);
+        budget.unpack(numbers, || format!("reading accessor {index}"))?;
         let mut numbers = Vec::new();
         if let (Some(view), false) = (accessor.buffer_view, size == 0 || accessor.count == 0) {
             let bytes = buffers.view(view, what)?;

@@ -32,6 +32,13 @@ pub fn texture_map(transform: &TextureTransform) -> TextureMap {
 
 const IDENTITY: TextureMap = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
+/// Where the bytes of an image are: two images of one place are one.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Source<'a> {
+    Uri(&'a str),
+    View(usize),
+}
+
 struct Gather<'a, 'b> {
     root: &'a Root,
     buffers: &'a Buffers<'a>,
@@ -39,7 +46,7 @@ struct Gather<'a, 'b> {
     build: &'b mut SoupBuilder,
     appearance: Appearance,
     textures: BTreeMap<usize, Option<usize>>,
-    images: BTreeMap<usize, Option<usize>>,
+    images: BTreeMap<Source<'a>, Option<usize>>,
 }
 
 /// Fills the soup's appearance; returns the texture maps of every material.
@@ -67,7 +74,7 @@ pub fn gather(
     Ok(maps)
 }
 
-impl Gather<'_, '_> {
+impl<'a> Gather<'a, '_> {
     fn material(&mut self, index: usize) -> Result<TextureMaps, ReadProblem> {
         let source = &self.root.materials[index];
         let pbr = &source.pbr_metallic_roughness;
@@ -150,15 +157,7 @@ impl Gather<'_, '_> {
             ));
             return Ok(None);
         };
-        let image = match self.images.get(&source) {
-            Some(known) => *known,
-            None => {
-                let image = self.image(index, source)?;
-                self.images.insert(source, image);
-                image
-            }
-        };
-        let Some(image) = image else {
+        let Some(image) = self.image(index, source)? else {
             return Ok(None);
         };
         let sampler = match texture.sampler {
@@ -185,19 +184,11 @@ impl Gather<'_, '_> {
     /// An image file; none, with a note, where it cannot be had: the surface does not depend on it.
     fn image(&mut self, texture: usize, index: usize) -> Result<Option<usize>, ReadProblem> {
         let from = || format!("texture {texture}");
-        let image = lookup(&self.root.images, index, "image", from)?;
-        let what = || format!("image {index}");
-        let bytes = match (&image.uri, image.buffer_view) {
-            (Some(uri), _) => match load_uri(uri, self.folder) {
-                Ok(bytes) => bytes.to_vec(),
-                Err(missing @ ReadProblem::ReferencedFile { .. }) => {
-                    let note = format!("image {index} is skipped: {missing}");
-                    self.build.note(note);
-                    return Ok(None);
-                }
-                Err(other) => return Err(other),
-            },
-            (None, Some(view)) => self.buffers.view(view, what)?.to_vec(),
+        let root: &'a Root = self.root;
+        let image = lookup(&root.images, index, "image", from)?;
+        let source = match (&image.uri, image.buffer_view) {
+            (Some(uri), _) => Source::Uri(uri),
+            (None, Some(view)) => Source::View(view),
             (None, None) => {
                 self.build.note(format!(
                     "image {index} is skipped: it has neither URI nor buffer view"
@@ -205,8 +196,35 @@ impl Gather<'_, '_> {
                 return Ok(None);
             }
         };
+        if let Some(known) = self.images.get(&source) {
+            return Ok(*known);
+        }
+        let image = self.load(index, source)?;
+        self.images.insert(source, image);
+        Ok(image)
+    }
+
+    fn load(&mut self, index: usize, source: Source) -> Result<Option<usize>, ReadProblem> {
+        let what = || format!("image {index}");
+        let budget = &mut self.build.budget;
+        let loaded;
+        let bytes = match source {
+            Source::Uri(uri) => match load_uri(uri, self.folder, budget) {
+                Ok(bytes) => {
+                    loaded = bytes;
+                    loaded.as_slice()
+                }
+                Err(missing @ ReadProblem::ReferencedFile { .. }) => {
+                    let note = format!("image {index} is skipped: {missing}");
+                    self.build.note(note);
+                    return Ok(None);
+                }
+                Err(other) => return Err(other),
+            },
+            Source::View(view) => self.buffers.view(view, what)?,
+        };
         // The bytes decide: declared types are often wrong.
-        let mime_type = match bytes.as_slice() {
+        let mime_type = match bytes {
             [0x89, b'P', b'N', b'G', ..] => "image/png",
             [0xff, 0xd8, 0xff, ..] => "image/jpeg",
             other => {
@@ -217,11 +235,10 @@ impl Gather<'_, '_> {
                 return Ok(None);
             }
         };
-        self.folder
-            .charge(bytes.len() as u64, || format!("image {index}"))?;
+        budget.unpack(bytes.len() as u64, what)?;
         self.appearance.images.push(EmbeddedImage {
             mime_type: mime_type.into(),
-            bytes,
+            bytes: bytes.to_vec(),
         });
         Ok(Some(self.appearance.images.len() - 1))
     }

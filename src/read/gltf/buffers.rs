@@ -3,6 +3,7 @@
 use super::meshopt;
 use super::schema::{BufferView, Meshopt, Root};
 use super::uri;
+use crate::read::budget::Budget;
 use crate::read::error::ReadProblem;
 use crate::read::folder::Folder;
 use std::rc::Rc;
@@ -69,10 +70,14 @@ pub fn range(
 }
 
 /// A data URI, or a file in the asset's folder.
-pub fn load_uri(uri: &str, folder: &mut Folder) -> Result<Rc<Vec<u8>>, ReadProblem> {
+pub fn load_uri(
+    uri: &str,
+    folder: &mut Folder,
+    budget: &mut Budget,
+) -> Result<Rc<Vec<u8>>, ReadProblem> {
     match uri::data(uri) {
         Some(bytes) => Ok(Rc::new(bytes?)),
-        None => folder.referenced(uri, &uri::relative_path(uri)?),
+        None => folder.referenced(uri, &uri::relative_path(uri)?, budget),
     }
 }
 
@@ -82,13 +87,14 @@ impl<'a> Buffers<'a> {
         root: &'a Root,
         binary: Option<&'a [u8]>,
         folder: &mut Folder,
+        budget: &mut Budget,
     ) -> Result<Self, ReadProblem> {
         let mut buffers = Vec::with_capacity(root.buffers.len());
         for (i, buffer) in root.buffers.iter().enumerate() {
             let extensions = &buffer.extensions;
             let data = match (&buffer.uri, i, binary) {
                 _ if extensions.ext_meshopt.fallback || extensions.khr_meshopt.fallback => None,
-                (Some(uri), ..) => Some(Data::Loaded(load_uri(uri, folder)?)),
+                (Some(uri), ..) => Some(Data::Loaded(load_uri(uri, folder, budget)?)),
                 (None, 0, Some(binary)) => Some(Data::Chunk(binary)),
                 // Legal where all its views are compressed; refused where it is used.
                 _ => None,
@@ -109,7 +115,7 @@ impl<'a> Buffers<'a> {
         for (i, view) in root.buffer_views.iter().enumerate() {
             let packed = view.extensions.khr_meshopt.as_ref();
             let packed = packed.or(view.extensions.ext_meshopt.as_ref());
-            let unpacked = packed.map(|p| all.unpack(i, view, p, folder)).transpose()?;
+            let unpacked = packed.map(|p| all.unpack(i, view, p, budget)).transpose()?;
             all.unpacked.push(unpacked);
         }
         Ok(all)
@@ -129,7 +135,7 @@ impl<'a> Buffers<'a> {
         index: usize,
         view: &BufferView,
         packed: &Meshopt,
-        folder: &mut Folder,
+        budget: &mut Budget,
     ) -> Result<Vec<u8>, ReadProblem> {
         let what = || format!("buffer view {index}");
         let buffer = self.buffer(packed.buffer, what)?;
@@ -154,7 +160,7 @@ impl<'a> Buffers<'a> {
                 view,
             }));
         }
-        folder.charge(size, || format!("unpacking buffer view {index}"))?;
+        budget.unpack(size, what)?;
         let filter = packed.filter.as_deref().unwrap_or("NONE");
         meshopt::unpack(bytes, mode, filter, stride, count).map_err(failed)
     }

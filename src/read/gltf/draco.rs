@@ -1,7 +1,11 @@
 //! `KHR_draco_mesh_compression`: one primitive as one Draco stream, unpacked by the crate `draco-core`.
 
+mod declared;
+
 use super::schema::Draco;
+use crate::read::budget::Budget;
 use crate::read::error::{Place, ReadProblem, shorten};
+use declared::Declared;
 use draco_core::{DecodeLimits, DecoderBuffer, Mesh, MeshDecoder};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -15,15 +19,12 @@ pub struct Unpacked {
     place: Place,
 }
 
-/// What a decode may produce.
-pub struct Limits {
-    /// Points.
-    pub points: u64,
-    /// Triangles.
-    pub faces: u64,
-    /// Bytes of attribute values.
-    pub bytes: u64,
-}
+/// Bytes that the decoder holds for a triangle: its corners, a table of corners and opposites, and the traversal.
+const TRIANGLE_BYTES: u64 = 48;
+/// The same for every attribute that has seams of its own.
+const SEAM_BYTES: u64 = 32;
+/// Copies of the values of an attribute that the decoder holds at a time, in bytes a byte of the smallest type.
+const COPIES: u64 = 8;
 
 /// Runs the decoder, and takes a panic inside it for a refusal.
 ///
@@ -42,13 +43,35 @@ fn guarded<T>(
     Err(ReadProblem::Draco { place, reason })
 }
 
-/// Unpacks a stream.
-pub fn unpack(bytes: &[u8], limits: &Limits, place: Place) -> Result<Unpacked, ReadProblem> {
+/// Unpacks a stream to at most `points` and `faces`; what it declares is checked against these and charged before it is decoded.
+pub fn unpack(
+    bytes: &[u8],
+    points: u64,
+    faces: u64,
+    budget: &mut Budget,
+    place: Place,
+) -> Result<Unpacked, ReadProblem> {
+    let refused = |what: &str, count: u64, limit: u64| ReadProblem::Draco {
+        place,
+        reason: format!("it declares {count} {what} where at most {limit} may follow"),
+    };
+    let declared = Declared::of(bytes).unwrap_or_default();
+    if declared.points > points {
+        return Err(refused("points", declared.points, points));
+    }
+    if declared.faces > faces {
+        return Err(refused("triangles", declared.faces, faces));
+    }
+    // Every instance unpacks it again.
+    let what = || format!("the Draco data of {place}");
+    let each = TRIANGLE_BYTES + SEAM_BYTES * u64::from(declared.seams);
+    budget.unpack(declared.faces.saturating_mul(each), what)?;
+    budget.unpack(bytes.len() as u64, what)?;
     let limits = DecodeLimits::default()
-        .with_max_points(limits.points)
-        .with_max_faces(limits.faces)
-        .with_max_decoded_bytes(limits.bytes);
-    guarded(place, || {
+        .with_max_points(points)
+        .with_max_faces(declared.faces)
+        .with_max_decoded_bytes(budget.left() / COPIES);
+    let unpacked = guarded(place, || {
         let mut buffer = DecoderBuffer::new(bytes).with_limits(limits);
         let mut mesh = Mesh::new();
         MeshDecoder::new().decode(&mut buffer, &mut mesh)?;
@@ -58,7 +81,12 @@ pub fn unpack(bytes: &[u8], limits: &Limits, place: Place) -> Result<Unpacked, R
             mesh,
             place,
         })
-    })
+    })?;
+    // Seams split points, so that there may be more than were declared.
+    match unpacked.points as u64 > points {
+        true => Err(refused("points", unpacked.points as u64, points)),
+        false => Ok(unpacked),
+    }
 }
 
 impl Unpacked {
@@ -68,10 +96,19 @@ impl Unpacked {
         draco: &Draco,
         name: &str,
         components: usize,
+        budget: &mut Budget,
     ) -> Result<Option<Vec<f64>>, ReadProblem> {
         let Some(&id) = draco.attributes.get(name) else {
             return Ok(None);
         };
+        let bytes = (12 * components as u64).saturating_mul(self.points as u64);
+        budget.unpack(bytes, || {
+            format!(
+                "the Draco attribute {} of {}",
+                shorten(name.as_bytes()),
+                self.place
+            )
+        })?;
         let numbers = guarded(self.place, || {
             let attribute = self.mesh.attribute_by_unique_id(id);
             Ok(attribute.map(|a| a.read_f32s(self.points, components)))

@@ -72,7 +72,8 @@ pub(super) fn read_gltf(
         .strip_prefix(b"\xef\xbb\xbf")
         .unwrap_or(&json[..end]);
     let objects = json.iter().filter(|&&b| b == b'{').count() as u64;
-    folder.charge(OBJECT_BYTES * objects, || "its JSON".into())?;
+    let budget = &mut build.budget;
+    budget.unpack(OBJECT_BYTES * objects, || "its JSON".into())?;
     let bad_json = |source| ReadProblem::Json { source };
     let preamble: Preamble = serde_json::from_slice(json).map_err(bad_json)?;
     check_version(&preamble)?;
@@ -82,11 +83,11 @@ pub(super) fn read_gltf(
     notes.into_iter().for_each(|note| build.note(note));
     let mut plan = Plan::default();
     for instance in &instances {
-        plan.add(&root, instance, folder, build)?;
+        plan.add(&root, instance, build)?;
     }
-    let buffers = Buffers::load(&root, binary, folder)?;
+    let buffers = Buffers::load(&root, binary, folder, &mut build.budget)?;
     let maps = appearance::gather(&root, &buffers, folder, build)?;
-    plan.read(&root, &buffers, &maps, folder, build)
+    plan.read(&root, &buffers, &maps, build)
 }
 
 fn check_version(preamble: &Preamble) -> Result<(), ReadProblem> {

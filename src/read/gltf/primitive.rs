@@ -9,9 +9,10 @@ use super::scene::{Affine, Instance};
 use super::schema::{Primitive, Root};
 use crate::geometry::ids::NONE;
 use crate::geometry::mesh::{AttributeKind, CornerAttribute};
+use crate::read::budget::Budget;
 use crate::read::build::SoupBuilder;
 use crate::read::error::{Place, ReadProblem, shorten};
-use crate::read::folder::Folder;
+use std::collections::HashMap;
 
 const TRIANGLES: u32 = 4;
 const STRIP: u32 = 5;
@@ -39,7 +40,13 @@ pub struct Plan<'a> {
     vertices: u64,
     faces: u64,
     attributes: Vec<CornerAttribute>,
+    /// Place of each kind in `attributes`.
+    columns: HashMap<AttributeKind, usize>,
 }
+
+/// Bytes of a vertex in the soup, and of a triangle with its material.
+const VERTEX_BYTES: u64 = 24;
+const FACE_BYTES: u64 = 16;
 
 /// The meaning of an attribute's name and the number of its components; `None` where it is of no use here.
 fn meaning(name: &str, components: usize) -> Option<(AttributeKind, usize)> {
@@ -66,7 +73,6 @@ impl<'a> Plan<'a> {
         &mut self,
         root: &'a Root,
         instance: &Instance,
-        folder: &mut Folder,
         build: &mut SoupBuilder,
     ) -> Result<(), ReadProblem> {
         let (node, mesh_index) = (instance.node, instance.mesh);
@@ -78,7 +84,8 @@ impl<'a> Plan<'a> {
                 primitive: i,
             };
             let parts = 1 + primitive.attributes.len() as u64;
-            folder.charge(OBJECT_BYTES * parts, || "its list of primitives".into())?;
+            let budget = &mut build.budget;
+            budget.unpack(OBJECT_BYTES * parts, || "its list of primitives".into())?;
             let mode = primitive.mode.unwrap_or(TRIANGLES);
             match mode {
                 0..=3 => {
@@ -130,6 +137,16 @@ impl<'a> Plan<'a> {
             self.faces = self.faces.saturating_add(faces);
             build.expect_vertices(self.vertices)?;
             build.expect_faces(self.faces)?;
+            let vertices = position.accessor.count.saturating_mul(VERTEX_BYTES);
+            let what =
+                |accessor: usize, use_: &str| format!("accessor {accessor} ({use_} of {place})");
+            build
+                .budget
+                .unpack(vertices, || what(position.index, "POSITION"))?;
+            let by = indices.unwrap_or(position);
+            build.budget.unpack(faces.saturating_mul(FACE_BYTES), || {
+                what(by.index, "indices")
+            })?;
             let attributes = self.attributes(root, primitive, &position, place, build)?;
             let title = |kind: &str, index: usize, name: &Option<String>| match name {
                 Some(name) => format!("{kind} {index} ({})", shorten(name.as_bytes())),
@@ -186,8 +203,7 @@ impl<'a> Plan<'a> {
                     vertices: position.accessor.count,
                 });
             }
-            let known = self.attributes.iter().position(|a| a.kind == kind);
-            let column = known.unwrap_or_else(|| {
+            let column = *self.columns.entry(kind.clone()).or_insert_with(|| {
                 self.attributes.push(CornerAttribute {
                     kind,
                     components,
@@ -219,22 +235,26 @@ impl<'a> Plan<'a> {
         root: &Root,
         buffers: &Buffers,
         maps: &[TextureMaps],
-        folder: &mut Folder,
         build: &mut SoupBuilder,
     ) -> Result<(), ReadProblem> {
         let what = || "corner attributes".to_owned();
-        folder.charge(self.attribute_bytes(self.faces), what)?;
+        build
+            .budget
+            .unpack(self.attribute_bytes(self.faces), what)?;
         for planned in std::mem::take(&mut self.primitives) {
             let first_face = build.soup.faces.len();
-            let unpacked = planned.unpack(buffers, folder, build)?;
+            let unpacked = planned.unpack(buffers, build)?;
             if let Some(unpacked) = &unpacked {
                 let more = (unpacked.triangles.len() as u64).saturating_sub(planned.faces);
-                folder.charge(self.attribute_bytes(more), what)?;
+                let bytes = self.attribute_bytes(more);
+                build.budget.unpack(bytes, what)?;
             }
             let corners = planned.geometry(root, buffers, unpacked.as_ref(), build)?;
             for &(column, name, values) in &planned.attributes {
                 let attribute = &mut self.attributes[column];
-                let numbers = planned.numbers(root, buffers, unpacked.as_ref(), name, &values)?;
+                let budget = &mut build.budget;
+                let unpacked = unpacked.as_ref();
+                let numbers = planned.numbers(root, buffers, unpacked, name, &values, budget)?;
                 let set = match attribute.kind {
                     AttributeKind::TexCoord(set) => Some(set),
                     _ => None,
@@ -299,23 +319,14 @@ impl Planned<'_> {
     fn unpack(
         &self,
         buffers: &Buffers,
-        folder: &mut Folder,
-        build: &SoupBuilder,
+        build: &mut SoupBuilder,
     ) -> Result<Option<draco::Unpacked>, ReadProblem> {
         let Some(packed) = &self.primitive.extensions.draco else {
             return Ok(None);
         };
         let bytes = buffers.view(packed.buffer_view, || self.place.to_string())?;
-        // Every instance unpacks it again.
-        folder.charge(bytes.len() as u64, || "Draco data".into())?;
-        let (vertices, faces) = build.room();
-        let limits = draco::Limits {
-            points: vertices,
-            faces,
-            // The crate's own ceiling: what one stream of a real asset needs at most.
-            bytes: folder.budget().min(2 << 30),
-        };
-        draco::unpack(bytes, &limits, self.place).map(Some)
+        let (points, faces) = build.room();
+        draco::unpack(bytes, points, faces, &mut build.budget, self.place).map(Some)
     }
 
     /// The numbers of an attribute, from the Draco data where that has it.
@@ -326,12 +337,13 @@ impl Planned<'_> {
         unpacked: Option<&draco::Unpacked>,
         name: &str,
         values: &Values,
+        budget: &mut Budget,
     ) -> Result<Vec<f64>, ReadProblem> {
         // Colours are fractions of 1, whether the file says so or not.
         let normalized = values.accessor.normalized || name.starts_with("COLOR_");
         let packed = self.primitive.extensions.draco.as_ref().zip(unpacked);
         if let Some((draco, unpacked)) = packed {
-            let numbers = unpacked.attribute(draco, name, values.components)?;
+            let numbers = unpacked.attribute(draco, name, values.components, budget)?;
             if let Some(mut numbers) = numbers {
                 if normalized {
                     numbers
@@ -349,7 +361,7 @@ impl Planned<'_> {
                 });
             }
         }
-        values.read(buffers, root, normalized)
+        values.read(buffers, root, normalized, budget)
     }
 
     /// Appends vertices and triangles; returns the primitive's own vertex at every corner.
@@ -363,7 +375,14 @@ impl Planned<'_> {
         build.part(self.name.clone());
         let base = build.soup.positions.len();
         let first_face = build.soup.faces.len();
-        let positions = self.numbers(root, buffers, unpacked, "POSITION", &self.position)?;
+        let positions = self.numbers(
+            root,
+            buffers,
+            unpacked,
+            "POSITION",
+            &self.position,
+            &mut build.budget,
+        )?;
         for p in positions.chunks_exact(3) {
             let p = [p[0], p[1], p[2]];
             // What is not finite is reported as the file has it.
@@ -409,7 +428,7 @@ impl Planned<'_> {
         }
         let indices: Vec<u32> = match &self.indices {
             Some(indices) => {
-                let numbers = indices.read(buffers, root, false)?;
+                let numbers = indices.read(buffers, root, false, &mut build.budget)?;
                 numbers.into_iter().map(|i| i as u32).collect()
             }
             None => (0..count as u32).collect(),

@@ -51,7 +51,7 @@ pub(super) fn read_ply(bytes: &[u8], build: &mut SoupBuilder) -> Result<(), Read
         values,
     } in attributes
     {
-        build.vertex_attribute(kind, columns.len(), &values);
+        build.vertex_attribute(kind, columns.len(), &values)?;
     }
     Ok(())
 }
