@@ -7,6 +7,7 @@
 mod real_models;
 
 use libtest_mimic::{Arguments, Failed, Trial};
+use real_models::watertight::watertight;
 use real_models::{CLEAN, checked, comparable, succeed};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -141,6 +142,7 @@ fn build_one(
 
 /// Asks the program and, where there is one, the independent checker.
 fn verify(atlas: &Path, source: Option<&Path>, cones: Option<usize>) -> Result<(), Failed> {
+    // A build has asked itself; the command is asked all the same.
     succeed("verify", program().arg("verify").arg(atlas))?;
     Ok(checked(atlas, source, cones)?)
 }
@@ -162,6 +164,9 @@ fn clean(model: &Path, genus: usize, loops: usize, settings: &[&str]) -> Result<
     // None on a disk that is flat as it is.
     if cones > 8 {
         return Err(format!("{cones} cones by default").into());
+    }
+    if settings.is_empty() {
+        watertight(&atlas, genus, loops, true)?;
     }
     verify(&atlas, comparable(model), Some(cones))
 }

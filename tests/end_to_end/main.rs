@@ -10,6 +10,7 @@ mod existence;
 mod fit;
 mod flows;
 mod good;
+mod hard;
 #[cfg(unix)]
 mod interrupt;
 mod lattice;

@@ -3,6 +3,8 @@
 // Not every test binary uses all of it.
 #![allow(dead_code)]
 
+pub mod watertight;
+
 use std::path::Path;
 use std::process::{Command, Output};
 

@@ -55,8 +55,12 @@ pub(super) struct TriangleIndex {
     cells: Vec<Content>,
     /// Linked lists: triangle and next node.
     nodes: Vec<(u32, u32)>,
-    /// Least and greatest level of any triangle that will come.
+    /// Least and greatest level of any triangle that will be added.
     levels: [i32; 2],
+    /// Level at which all lies in a few cells, for triangles that are asked for and larger than any that was added.
+    top: i32,
+    /// Box of all triangles that were added.
+    bounds: ([f64; 2], [f64; 2]),
     /// Levels that have triangles of their own, by their place above the least.
     used: [bool; DEPTH + 1],
     /// Deepest overlap that still counts as touching.
@@ -65,10 +69,12 @@ pub(super) struct TriangleIndex {
 
 /// Levels below that of the largest triangle: finer than a thousandth of it pays no more.
 const DEPTH: usize = 10;
+/// Levels above it: a million triangles in a row reach no further.
+const ABOVE: i32 = 20;
 
 impl TriangleIndex {
-    /// For triangles whose bounding boxes measure `sizes[0]` to `sizes[1]`. Others are found as well,
-    /// only more slowly.
+    /// For adding triangles whose bounding boxes measure `sizes[0]` to `sizes[1]`. Others are found as well,
+    /// only more slowly. Those asked for may have any size.
     pub fn new(sizes: [f64; 2], tolerance: f64) -> TriangleIndex {
         let largest = level(sizes[1]);
         let least = level(sizes[0]).clamp(largest - DEPTH as i32, largest);
@@ -78,13 +84,11 @@ impl TriangleIndex {
             cells: Vec::new(),
             nodes: Vec::new(),
             levels: [least, largest],
+            top: largest + ABOVE,
+            bounds: ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]),
             used: [false; DEPTH + 1],
             tolerance,
         }
-    }
-
-    fn level_of(&self, t: &Triangle) -> i32 {
-        level(size(t)).clamp(self.levels[0], self.levels[1])
     }
 
     /// Where the cells of a cell's block begin; `last` is the block that was asked for before.
@@ -117,10 +121,15 @@ impl TriangleIndex {
     /// Adds a triangle.
     pub fn insert(&mut self, t: Triangle) {
         let id = self.triangles.len() as u32;
-        let own = self.level_of(&t);
+        let own = level(size(&t)).clamp(self.levels[0], self.levels[1]);
+        let (low, high) = bounds(&t);
+        for i in 0..2 {
+            self.bounds.0[i] = self.bounds.0[i].min(low[i]);
+            self.bounds.1[i] = self.bounds.1[i].max(high[i]);
+        }
         self.used[(own - self.levels[0]) as usize] = true;
         self.triangles.push(t);
-        for (x, y) in cells(&t, own) {
+        for (x, y) in cells((low, high), own) {
             let number = self.number((own, x, y));
             let content = &mut self.cells[number];
             let is_new = content.own == END && !content.is_parent;
@@ -128,7 +137,7 @@ impl TriangleIndex {
             content.own = (self.nodes.len() - 1) as u32;
             let (mut at, mut go_on) = ((own, x, y), is_new);
             // Parents know already where anything was there before.
-            while go_on && at.0 < self.levels[1] {
+            while go_on && at.0 < self.top {
                 // Shifts round down, as cells do.
                 at = (at.0 + 1, at.1 >> 1, at.2 >> 1);
                 let number = self.number(at);
@@ -142,12 +151,21 @@ impl TriangleIndex {
     /// True where the triangle overlaps one that was added.
     pub fn overlaps(&self, t: &Triangle) -> bool {
         let tolerance = self.tolerance;
-        let own = self.level_of(t);
+        let (low, high) = bounds(t);
+        let common = (
+            [0, 1].map(|i| low[i].max(self.bounds.0[i])),
+            [0, 1].map(|i| high[i].min(self.bounds.1[i])),
+        );
+        // NaN is no common part either.
+        if !(0..2).all(|i| common.0[i] <= common.1[i]) {
+            return false;
+        }
+        let own = level(size(t)).clamp(self.levels[0], self.top);
         let larger = |k: &i32| self.used[(k - self.levels[0]) as usize];
         let mut below: Vec<Cell> = Vec::new();
         // No cell has this level.
         let mut last = ((i32::MAX, 0, 0), None);
-        for (x, y) in cells(t, own) {
+        for (x, y) in cells(common, own) {
             let content = self.content((own, x, y), &mut last);
             if self.meets_list(t, content.own, tolerance) {
                 return true;
@@ -157,7 +175,7 @@ impl TriangleIndex {
             }
         }
         if (own + 1..=self.levels[1]).filter(larger).any(|k| {
-            cells(t, k).any(|(x, y)| {
+            cells(common, k).any(|(x, y)| {
                 let content = self.content((k, x, y), &mut last);
                 self.meets_list(t, content.own, tolerance)
             })
@@ -165,9 +183,9 @@ impl TriangleIndex {
             return true;
         }
         while let Some((k, x, y)) = below.pop() {
-            let [xs, ys] = cell_range(t, k - 1);
+            let [xs, ys] = cell_range(common, k - 1);
             for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| (2 * x + i, 2 * y + j)) {
-                if !(xs.contains(&x) && ys.contains(&y)) {
+                if !(xs.contains(&x) && ys.contains(&y)) || is_outside(t, (k - 1, x, y)) {
                     continue;
                 }
                 let content = self.content((k - 1, x, y), &mut last);
@@ -216,17 +234,39 @@ fn level(size: f64) -> i32 {
     exponent + i32::from(bits << 12 != 0)
 }
 
-fn cells(t: &Triangle, level: i32) -> impl Iterator<Item = (i64, i64)> + use<> {
-    let [xs, ys] = cell_range(t, level);
+fn cells(bounds: ([f64; 2], [f64; 2]), level: i32) -> impl Iterator<Item = (i64, i64)> + use<> {
+    let [xs, ys] = cell_range(bounds, level);
     xs.flat_map(move |x| ys.clone().map(move |y| (x, y)))
 }
 
-/// Columns and rows of the cells that a triangle's bounding box touches.
-fn cell_range(t: &Triangle, level: i32) -> [std::ops::RangeInclusive<i64>; 2] {
+/// Whether a cell lies beyond a side of a counterclockwise triangle, by more than rounding.
+fn is_outside(t: &Triangle, (level, x, y): Cell) -> bool {
+    let side = power_of_two(level);
+    let low = [x as f64 * side, y as f64 * side];
+    (0..3).any(|k| {
+        let (p, q) = (t[k], t[(k + 1) % 3]);
+        let d = [q[0] - p[0], q[1] - p[1]];
+        // The cell's corner that lies furthest in.
+        let corner = [
+            low[0] + if d[1] < 0.0 { side } else { 0.0 },
+            low[1] + if d[0] > 0.0 { side } else { 0.0 },
+        ];
+        let inward = d[0] * (corner[1] - p[1]) - d[1] * (corner[0] - p[0]);
+        let reach = corner[0].abs() + corner[1].abs() + p[0].abs() + p[1].abs();
+        inward < -1e-14 * (d[0].abs() + d[1].abs()) * reach
+    })
+}
+
+/// 2^k, for exponents that normal numbers have.
+fn power_of_two(k: i32) -> f64 {
+    let exponent = (1023 + i64::from(k)).clamp(1, 2046);
+    f64::from_bits((exponent as u64) << 52)
+}
+
+/// Columns and rows of the cells that a box touches.
+fn cell_range((low, high): ([f64; 2], [f64; 2]), level: i32) -> [std::ops::RangeInclusive<i64>; 2] {
     // A power of two: dividing by it and multiplying by its inverse are the same.
-    let exponent = (1023 - i64::from(level)).clamp(1, 2046);
-    let per_unit = f64::from_bits((exponent as u64) << 52);
-    let (low, high) = bounds(t);
+    let per_unit = power_of_two(-level);
     let at = |x: f64| floor(x * per_unit);
     [0, 1].map(|i| at(low[i])..=at(high[i]))
 }
@@ -317,5 +357,28 @@ mod tests {
             }
         }
         assert!(refused > 100 && kept.len() > 100);
+        // Much larger ones, thin and thick, near and far.
+        let mut answers = [0; 2];
+        for i in 0..2000 {
+            let scale = (40.0 * random()).exp2();
+            let thin = if i % 2 == 0 { 1e-6 } else { 1.0 };
+            let t = T.map(|p| {
+                [
+                    scale * (p[0] - 0.5) + random(),
+                    thin * scale * (p[1] - 0.5) + 8.0 * random() - 4.0,
+                ]
+            });
+            let t = if (t[1][0] - t[0][0]) * (t[2][1] - t[0][1])
+                > (t[2][0] - t[0][0]) * (t[1][1] - t[0][1])
+            {
+                t
+            } else {
+                [t[0], t[2], t[1]]
+            };
+            let brute = kept.iter().any(|k| overlap(&t, k, 1e-12));
+            assert_eq!(index.overlaps(&t), brute, "{t:?}");
+            answers[usize::from(brute)] += 1;
+        }
+        assert!(answers.iter().all(|&n| n > 100), "{answers:?}");
     }
 }
