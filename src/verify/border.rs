@@ -1,8 +1,9 @@
 //! Whether the border of a patch crosses itself: another way to see that no two of its faces overlap.
 //!
 //! A disk whose faces are all counterclockwise covers a point of the plane as often as its border winds around that point. So where the
-//! border is one simple closed curve, every point is covered once at most. This takes the border's edges alone: patches of long faces that
-//! all meet in one point, where every pair of faces would have to be looked at, have a short one.
+//! border is one simple closed curve, every point is covered once at most. This takes the border's edges alone, which are few; and patches of
+//! long faces that all meet in one point, where every pair of faces would have to be looked at, have a short one. A part of a slit disk that
+//! has one border is a disk.
 //!
 //! *Not guaranteed:* that a border which only touches itself, to the tolerance, is told from one that crosses itself there; its turning
 //! number, which must be 1, tells most of these.
@@ -12,14 +13,13 @@ use super::central::at_corner;
 use super::formulas::{Point2, distance2, sub2};
 use super::grid::Grid;
 use super::surface::Surface;
-use std::collections::HashSet;
 use std::f64::consts::{PI, TAU};
 
 /// Most pairs of edges that are compared, for each edge, and besides.
 const PAIRS: (u64, u64) = (2000, 10_000_000);
 
-/// Whether a patch is a disk with a border that is one simple closed curve, up to `tolerance` (a length). `None` where the patch is no disk, or
-/// where that cannot be told in bounded work. `inside` tells halfedges across which the patch goes on.
+/// Whether the border of a part of a slit disk is one simple closed curve, up to `tolerance` (a length). `None` where there are several borders, or
+/// where that cannot be told in bounded work. `inside` tells halfedges across which the part goes on.
 pub(super) fn is_simple(
     surface: &Surface<'_>,
     arrays: &Arrays,
@@ -34,11 +34,6 @@ pub(super) fn is_simple(
     };
     let border: Vec<usize> = halfedges().filter(|h| !inside(*h)).collect();
     let path = around(surface, &border, &inside)?;
-    // Euler's formula: edges are counted by their halfedges, vertices by the corners that hang together.
-    let edges = (3 * faces.len() + border.len()) / 2;
-    if fans(surface, faces, &inside) + faces.len() != edges + 1 {
-        return None;
-    }
     let points: Vec<Point2> = (path.iter())
         .map(|h| at_corner(&arrays.patch_uv, surface.tail_corner(*h)))
         .collect();
@@ -72,41 +67,6 @@ fn around(
         }
         path.push(h);
     }
-}
-
-/// Number of vertices of the patch, one that the border meets several times counted as often.
-fn fans(surface: &Surface<'_>, faces: &[u32], inside: &impl Fn(usize) -> bool) -> usize {
-    let mut seen: HashSet<usize> = HashSet::with_capacity(3 * faces.len());
-    let mut count = 0;
-    for h in faces
-        .iter()
-        .flat_map(|f| 3 * *f as usize..3 * *f as usize + 3)
-    {
-        if !seen.insert(h) {
-            continue;
-        }
-        count += 1;
-        // Halfedges that leave one vertex: counterclockwise, and, from a border, clockwise.
-        let mut at = h;
-        let mut closed = false;
-        while let Some(t) = Some(surface.previous(at)).filter(|p| inside(*p)) {
-            let Some(next) = surface.twin(t) else { break };
-            if !seen.insert(next) {
-                closed = next == h;
-                break;
-            }
-            at = next;
-        }
-        let mut at = h;
-        while !closed && inside(at) {
-            let Some(t) = surface.twin(at) else { break };
-            at = surface.next(t);
-            if !seen.insert(at) {
-                break;
-            }
-        }
-    }
-    count
 }
 
 /// The sum of exterior angles of a polygon, radians: 2π times its turning number.

@@ -236,23 +236,25 @@ fn measure(
             range = [range[0].min(scale), range[1].max(scale)];
         }
     }
-    let triangles: Vec<[Point2; 3]> = faces.iter().map(|f| uv(*f)).collect();
     // `rectangle` patches are not similar to the chart.
     let is_rectangle = patch.domain == "rectangle" && patch.patch_to_chart.is_none();
     let lacks_map = patch.patch_to_chart.is_none() && !is_rectangle;
     let flipped = faces.iter().any(|f| !is_positive(uv(*f), reach));
     let tolerance = OVERLAP_TOLERANCE * diameter;
-    let mut overlap = find_overlap(&triangles, tolerance);
-    if overlap == Overlap::Undecided && !flipped {
-        let cut = arrays.cut.as_flattened();
-        let inside = |h: usize| {
-            let beyond = surface.twin(h).map(|t| arrays.patch[t / 3]);
-            cut[h] == 0 && beyond == Some(arrays.patch[h / 3])
-        };
-        if border::is_simple(surface, arrays, faces, inside, tolerance) == Some(true) {
-            overlap = Overlap::None;
+    let cut = arrays.cut.as_flattened();
+    let inside = |h: usize| {
+        let beyond = surface.twin(h).map(|t| arrays.patch[t / 3]);
+        cut[h] == 0 && beyond == Some(arrays.patch[h / 3])
+    };
+    let simple =
+        !flipped && border::is_simple(surface, arrays, faces, inside, tolerance) == Some(true);
+    let overlap = match simple {
+        true => Overlap::None,
+        false => {
+            let triangles: Vec<[Point2; 3]> = faces.iter().map(|f| uv(*f)).collect();
+            find_overlap(&triangles, tolerance)
         }
-    }
+    };
     Measured {
         shape: shape.0,
         flipped,

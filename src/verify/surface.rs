@@ -107,11 +107,6 @@ impl<'a> Surface<'a> {
         h - h % 3 + (h % 3 + 1) % 3
     }
 
-    /// The halfedge of the same face before.
-    pub fn previous(&self, h: usize) -> usize {
-        h - h % 3 + (h % 3 + 2) % 3
-    }
-
     /// Vertex that a halfedge leaves.
     pub fn tail(&self, h: usize) -> usize {
         self.faces[h / 3][(h % 3 + 1) % 3] as usize

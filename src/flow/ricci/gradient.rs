@@ -12,9 +12,10 @@
 //!
 //! A flow converges (Definition 18) when K *and* γ do. |K − K̄| ≤ tolerance alone leaves u off by that over λ₁, which
 //! is large on large meshes. With λ₁ measured from the decay, the flow goes on until the remaining way in u is
-//! below `REMAINING_CHANGE`, or until rounding stops the decay.
+//! below `REMAINING_CHANGE`, or until rounding stops the decay. What is left then is taken by [`polish`]; it is not in the record.
 
 use super::error::FlowError;
+use super::polish::polish;
 use super::problem::{Problem, Solution};
 use crate::flow::metric::Evaluation;
 use crate::flow::scale::{dot, shift};
@@ -179,6 +180,12 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
             rate = Some((window.1 / line.max_error).ln() / (line.flow_time - window.0));
             window = (line.flow_time, line.max_error);
         }
+    }
+    polish(problem, &mut u, &mut now)?;
+    if problem.scale_free {
+        let constant = start_mean - mean(&u);
+        shift(&mut u, constant);
+        problem.metric.evaluate(&u, &mut now);
     }
     if now.shape.iter().any(|s| s.broken) {
         return Err(problem.not_converged(line.iteration, &now));

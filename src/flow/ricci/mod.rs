@@ -22,6 +22,7 @@ pub mod gradient;
 mod minimise;
 pub mod newton;
 mod params;
+mod polish;
 mod problem;
 #[cfg(test)]
 pub(crate) mod shapes;
