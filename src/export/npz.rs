@@ -8,7 +8,6 @@ use crate::export::EncodeError;
 use crate::flow::prescription::BoundaryCondition;
 use crate::geometry::ids::{EdgeId, FaceId, NONE, PatchId};
 use crate::product::AffineAtlas;
-use npyz::{AutoSerialize, WriterBuilder};
 use std::io::{BufWriter, Seek, Write};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
@@ -22,6 +21,9 @@ const COMPRESSION_LEVEL: i64 = 2;
 
 /// From this size on an entry gets 64-bit lengths. Below the 32-bit limit, because deflate may enlarge.
 const LARGE_ENTRY_BYTES: u64 = 0xF000_0000;
+
+/// Magic string and version of a `.npy` file.
+const NPY_START: [u8; 8] = *b"\x93NUMPY\x01\x00";
 
 /// Writes the archive. Expects [`super::check_shapes`] to hold.
 pub fn write<W: Write + Seek>(atlas: &AffineAtlas, writer: W) -> Result<(), EncodeError> {
@@ -203,14 +205,14 @@ impl<W: Write + Seek> Archive<W> {
     }
 
     /// Writes an array.
-    fn array<T: AutoSerialize>(
+    fn array<T: Number>(
         &mut self,
         name: &str,
         shape: &[usize],
         values: impl Iterator<Item = T>,
     ) -> Result<(), EncodeError> {
-        let shape: Vec<u64> = shape.iter().map(|&n| n as u64).collect();
-        let bytes = shape.iter().product::<u64>() * size_of::<T>() as u64;
+        let count: usize = shape.iter().product();
+        let bytes = count as u64 * size_of::<T>() as u64;
         let options = SimpleFileOptions::default()
             .compression_method(CompressionMethod::Deflated)
             .compression_level(Some(COMPRESSION_LEVEL))
@@ -222,16 +224,68 @@ impl<W: Write + Seek> Archive<W> {
             .start_file(format!("{name}.npy"), options)
             .map_err(zip_error)?;
         let mut buffer = BufWriter::with_capacity(BUFFER_BYTES, &mut self.zip);
-        let mut body = npyz::WriteOptions::new()
-            .default_dtype()
-            .shape(&shape)
-            .writer(&mut buffer)
-            .begin_nd()?;
-        body.extend(values)?;
-        body.finish()?;
+        buffer.write_all(&header(T::DESCR, shape))?;
+        let mut written = 0;
+        for value in values {
+            buffer.write_all(value.little_endian().as_ref())?;
+            written += 1;
+        }
         buffer.flush()?;
-        Ok(())
+        match written == count {
+            true => Ok(()),
+            false => Err(EncodeError::Format(format!(
+                "atlas.npz {name} has {written} numbers and a shape for {count}"
+            ))),
+        }
     }
+}
+
+/// A number type of the contract.
+trait Number {
+    /// NumPy's name for it.
+    const DESCR: &'static str;
+    /// As the file holds it.
+    fn little_endian(self) -> impl AsRef<[u8]>;
+}
+
+impl Number for f64 {
+    const DESCR: &'static str = "<f8";
+    fn little_endian(self) -> impl AsRef<[u8]> {
+        self.to_le_bytes()
+    }
+}
+
+impl Number for u32 {
+    const DESCR: &'static str = "<u4";
+    fn little_endian(self) -> impl AsRef<[u8]> {
+        self.to_le_bytes()
+    }
+}
+
+impl Number for u8 {
+    const DESCR: &'static str = "|u1";
+    fn little_endian(self) -> impl AsRef<[u8]> {
+        [self]
+    }
+}
+
+/// What precedes the numbers: version 1.0 of NumPy's format, with its text filled up with spaces so that the numbers begin at a multiple
+/// of 64 bytes.
+fn header(descr: &str, shape: &[usize]) -> Vec<u8> {
+    let mut text = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': (");
+    for n in shape {
+        text += &format!("{n}, ");
+    }
+    text += "), }";
+    let whole = (NPY_START.len() + 2 + text.len() + 1).next_multiple_of(64);
+    let length = whole - NPY_START.len() - 2;
+    let mut header = NPY_START.to_vec();
+    // At most four dimensions of at most 20 digits: far below the 65,535 bytes that the length holds.
+    header.extend((length as u16).to_le_bytes());
+    header.extend(text.bytes());
+    header.resize(whole - 1, b' ');
+    header.push(b'\n');
+    header
 }
 
 fn zip_error(error: zip::result::ZipError) -> EncodeError {
@@ -389,6 +443,39 @@ mod tests {
         assert_eq!(read(bytes(&atlas))["target_curvature"].2[1], 0.25);
         atlas.prescription.boundary = BoundaryCondition::Uniform;
         assert_eq!(read(bytes(&atlas))["target_curvature"].2[1], 0.0);
+    }
+
+    #[test]
+    fn headers_are_those_of_another_writer() {
+        fn of<T: npyz::AutoSerialize>(shape: &[u64]) -> Vec<u8> {
+            use npyz::WriterBuilder;
+            let mut bytes = Vec::new();
+            let options = npyz::WriteOptions::<T>::new().default_dtype().shape(shape);
+            options.writer(&mut bytes).begin_nd().unwrap().finish().ok();
+            bytes
+        }
+        // Digits around the step from 128 to 192 bytes.
+        for n in (0..20).map(|i| 10_u64.pow(i) / 2) {
+            for shape in [vec![n], vec![n, 3], vec![1, n, 2], vec![1, 1, n, 3]] {
+                let own: Vec<usize> = shape.iter().map(|&n| n as usize).collect();
+                assert_eq!(header("<f8", &own), of::<f64>(&shape));
+                assert_eq!(header("<u4", &own), of::<u32>(&shape));
+                assert_eq!(header("|u1", &own), of::<u8>(&shape));
+            }
+        }
+    }
+
+    #[test]
+    fn arrays_and_shapes_must_agree() {
+        let mut archive = Archive {
+            zip: ZipWriter::new(Cursor::new(Vec::new())),
+        };
+        archive.array("a", &[2, 2], 0..4_u32).unwrap();
+        let error = archive.array("b", &[2, 2], 0..3_u32).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "atlas.npz b has 3 numbers and a shape for 4"
+        );
     }
 
     #[test]

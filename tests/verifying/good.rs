@@ -1,13 +1,11 @@
 //! Atlases that are right pass every check: alone, as components, and as assets of an output folder.
 
-mod verify_fixture;
-
+use crate::fixture::{Atlas, cone, pillow, torus, tube};
 use affine_atlas::verify::{
     SourceSurface, Verdicts, VerifyError, VerifyOptions, verify, verify_against,
 };
 use serde_json::json;
 use std::path::Path;
-use verify_fixture::{Atlas, cone, pillow, torus, tube};
 
 fn run(folder: &Path) -> Verdicts {
     verify(folder, &VerifyOptions::default()).expect("something to verify")

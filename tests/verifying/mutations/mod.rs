@@ -1,8 +1,5 @@
 //! Every check can fail: a right atlas is damaged in one place, and exactly the checks that must notice do.
 
-#[path = "../verify_fixture/mod.rs"]
-mod verify_fixture;
-
 macro_rules! mutation {
     ($make:ident, $what:literal, |$atlas:ident| $damage:expr, [$($fails:literal),* $(,)?]) => {
         Mutation {
@@ -18,10 +15,10 @@ mod charts;
 mod images;
 mod metric;
 
+use crate::fixture::{Atlas, Picture, cone, pillow, torus, tube};
 use affine_atlas::verify::{VerifyOptions, verify};
 use serde_json::json;
 use std::collections::BTreeSet;
-use verify_fixture::{Atlas, Picture, cone, pillow, torus, tube};
 
 struct Mutation {
     what: &'static str,

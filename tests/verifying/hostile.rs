@@ -1,12 +1,10 @@
 //! Damaged files, byte by byte: always a failed check, never a panic, never more memory than the file can fill.
 
-mod verify_fixture;
-
+use crate::fixture::{Npy, torus, tube, write_npz};
 use affine_atlas::verify::{Verdicts, VerifyOptions, verify};
 use serde_json::{Value, json};
 use std::io::Write;
 use std::path::Path;
-use verify_fixture::{Npy, torus, tube, write_npz};
 
 fn run(folder: &Path) -> Verdicts {
     verify(folder, &VerifyOptions::default()).expect("an atlas.json")
@@ -385,7 +383,7 @@ fn a_surface_without_faces_is_a_failed_check() {
     let folder = tempfile::tempdir().expect("a folder");
     let atlas = torus();
     atlas.write(folder.path());
-    let arrays = verify_fixture::Arrays::default();
+    let arrays = crate::fixture::Arrays::default();
     write_npz(&folder.path().join("atlas.npz"), &arrays.npy());
     assert_eq!(
         failed(&run(folder.path())),

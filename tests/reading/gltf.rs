@@ -1,7 +1,5 @@
 //! glTF and GLB: what is read, and what is refused with which words. Every asset is built here.
 
-mod mutation;
-
 use affine_atlas::geometry::ids::NONE;
 use affine_atlas::geometry::mesh::{AttributeKind, CornerAttribute, Soup};
 use affine_atlas::read::{ReadParams, SourceAsset, read, read_bytes};
@@ -1570,10 +1568,10 @@ fn texture_transforms_are_written_into_the_coordinates() {
 
 #[test]
 fn damaged_assets_are_read_or_refused() {
-    mutation::survive("square.glb", &square().glb(), 6000);
-    mutation::survive("meshopt.glb", &meshopt().glb(), 6000);
+    crate::mutation::survive("square.glb", &square().glb(), 6000);
+    crate::mutation::survive("meshopt.glb", &meshopt().glb(), 6000);
     for hex in DRACO {
-        mutation::survive("draco.glb", &draco(hex).glb(), 3000);
+        crate::mutation::survive("draco.glb", &draco(hex).glb(), 3000);
         // Damage to the stream alone, which the decoder must survive.
         let whole = draco(hex);
         for at in 0..whole.binary.len() {
@@ -1618,5 +1616,5 @@ fn damaged_assets_are_read_or_refused() {
         base64(&asset.binary)
     );
     asset.json["buffers"] = json!([{"byteLength": asset.binary.len(), "uri": uri}]);
-    mutation::survive("rich.gltf", &asset.json_bytes(), 8000);
+    crate::mutation::survive("rich.gltf", &asset.json_bytes(), 8000);
 }
