@@ -151,8 +151,10 @@ impl<'a> Values<'a> {
                 value
             }
         };
-        let numbers = accessor.count.saturating_mul(8 * components as u64);
-        budget.unpack(numbers, || format!("reading accessor {index}"))?;
+        let mut charge = || {
+            let bytes = accessor.count.saturating_mul(8 * components as u64);
+            budget.unpack(bytes, || format!("reading accessor {index}"))
+        };
         let mut numbers = Vec::new();
         if let (Some(view), false) = (accessor.buffer_view, size == 0 || accessor.count == 0) {
             let bytes = buffers.view(view, what)?;
@@ -167,12 +169,14 @@ impl<'a> Values<'a> {
                 .saturating_add(size);
             let container = || format!("buffer view {view}");
             let bytes = range(bytes, accessor.byte_offset, length, what, container)?;
+            charge()?;
             numbers.reserve_exact(accessor.count as usize * components);
             for value in bytes.chunks(stride as usize) {
                 let value = value[..size as usize].chunks_exact(component.bytes() as usize);
                 numbers.extend(value.map(number));
             }
         } else {
+            charge()?;
             numbers.resize(accessor.count as usize * components, 0.0);
         }
         let Some(sparse) = &accessor.sparse else {

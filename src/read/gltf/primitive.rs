@@ -137,16 +137,6 @@ impl<'a> Plan<'a> {
             self.faces = self.faces.saturating_add(faces);
             build.expect_vertices(self.vertices)?;
             build.expect_faces(self.faces)?;
-            let vertices = position.accessor.count.saturating_mul(VERTEX_BYTES);
-            let what =
-                |accessor: usize, use_: &str| format!("accessor {accessor} ({use_} of {place})");
-            build
-                .budget
-                .unpack(vertices, || what(position.index, "POSITION"))?;
-            let by = indices.unwrap_or(position);
-            build.budget.unpack(faces.saturating_mul(FACE_BYTES), || {
-                what(by.index, "indices")
-            })?;
             let attributes = self.attributes(root, primitive, &position, place, build)?;
             let title = |kind: &str, index: usize, name: &Option<String>| match name {
                 Some(name) => format!("{kind} {index} ({})", shorten(name.as_bytes())),
@@ -383,6 +373,9 @@ impl Planned<'_> {
             &self.position,
             &mut build.budget,
         )?;
+        let what = || format!("the geometry of {}", self.place);
+        let vertices = positions.len() as u64 / 3;
+        build.budget.unpack(vertices * VERTEX_BYTES, what)?;
         for p in positions.chunks_exact(3) {
             let p = [p[0], p[1], p[2]];
             // What is not finite is reported as the file has it.
@@ -419,7 +412,11 @@ impl Planned<'_> {
             corners.extend(triangle);
             build.face(triangle.map(|i| base as u32 + i), material)
         };
+        let faces = unpacked.map_or(self.faces, |unpacked| unpacked.triangles.len() as u64);
         if let Some(unpacked) = unpacked {
+            build
+                .budget
+                .unpack(faces.saturating_mul(FACE_BYTES), what)?;
             // Draco holds triangles, whatever the primitive's mode.
             for &triangle in &unpacked.triangles {
                 emit(triangle, build)?;
@@ -433,6 +430,9 @@ impl Planned<'_> {
             }
             None => (0..count as u32).collect(),
         };
+        build
+            .budget
+            .unpack(faces.saturating_mul(FACE_BYTES), what)?;
         match self.mode {
             TRIANGLES => {
                 for triangle in indices.chunks_exact(3) {
