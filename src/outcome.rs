@@ -2,7 +2,7 @@
 
 use crate::export::folder::list_files;
 use crate::product::AffineAtlas;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 use std::path::{Path, PathBuf};
 
 /// Why an asset or a component was not built (`kind` in the manifest).
@@ -53,6 +53,11 @@ pub struct Failure {
     pub message: String,
 }
 
+/// A path need not be Unicode; this one is only shown.
+fn shown<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&path.to_string_lossy())
+}
+
 /// The figures that the final summary shows of a built component.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
@@ -74,6 +79,7 @@ pub struct Summary {
     /// (9), both areas normalised to 1.
     pub area_distortion: f64,
     /// Folder that was written.
+    #[serde(serialize_with = "shown")]
     pub folder: PathBuf,
 }
 

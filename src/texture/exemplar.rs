@@ -9,7 +9,7 @@
 use super::ExemplarError;
 use crate::export::pictures::colour::{to_bytes, to_linear};
 use crate::read::bounded::open_regular;
-use image::{ImageReader, RgbaImage};
+use image::{ImageFormat, ImageReader, RgbaImage};
 use std::io::BufReader;
 use std::path::Path;
 
@@ -84,7 +84,12 @@ impl Exemplar {
         };
         let open = || {
             let (file, _) = open_regular(path)?;
-            ImageReader::new(BufReader::new(file)).with_guessed_format()
+            let mut reader = ImageReader::new(BufReader::new(file));
+            if let Ok(format) = ImageFormat::from_path(path) {
+                reader.set_format(format);
+            }
+            // By its content, or where that says nothing by its name.
+            reader.with_guessed_format()
         };
         let (width, height) = open().map_err(io)?.into_dimensions().map_err(no_image)?;
         if width.max(height) > SIDE_LIMIT {
