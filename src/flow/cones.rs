@@ -5,15 +5,15 @@
 //!
 //! An asset may have several components, and Gauss–Bonnet holds for each: [`assign`] finds the component of every
 //! vertex and point that the user names, [`prescribe`] then works on one component. Without any wish the program chooses places and
-//! curvatures by itself (the private module `auto`), so that the log scale deviates least from its mean:
+//! curvatures by itself (the private module `auto`), so that areas grow and shrink least:
 //!
 //! | component | cones |
 //! | --- | --- |
-//! | closed, of any genus | at most 8 that add up to 2πχ; as many as that needs |
-//! | with boundary | at most 8, none where the surface is flat; the boundary is free |
-//! | with a boundary that is prescribed | no more than Gauss–Bonnet needs: none on a disk |
+//! | closed, of any genus | 8 that add up to 2πχ, or twice as many as that needs; more where each gains much |
+//! | with boundary | 8, or twice as many as the curvature of the interior needs; none where the surface is flat; the boundary is free |
+//! | with a boundary that is prescribed | no more than Gauss–Bonnet and the handles need: none on a disk |
 //!
-//! Cones that would lower the deviation by less than a hundredth are left out. A component to which a list names no cone is treated as
+//! Cones that would gain less than a hundredth are left out. A component to which a list names no cone is treated as
 //! if there were no list.
 //!
 //! *Guaranteed:* cone angles are positive, ΣK̄ = 2πχ (to rounding) unless the boundary is free, and then Σ over the interior
@@ -103,7 +103,7 @@ impl Prescription {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ConeStrategy {
-    /// The list where there is one, else places and curvatures that make [`ConeObjective`] least; see the module docs.
+    /// The list where there is one, else places and curvatures that distort areas least; see the module docs.
     #[default]
     Auto,
     /// Those of the list.
@@ -114,17 +114,6 @@ pub enum ConeStrategy {
     Spread,
     /// No cones in the interior.
     None,
-}
-
-/// What the automatic choice of cones makes least.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ConeObjective {
-    /// Standard deviation of the log scale over the area: shrinking counts as much as growing.
-    #[default]
-    LogScale,
-    /// Area distortion (9): ruled by what grows; parts that shrink to nothing cost no more than their area.
-    AreaDistortion,
 }
 
 /// A cone that the user names by vertex or by point.
@@ -149,17 +138,15 @@ pub struct ConeParams {
     pub strategy: ConeStrategy,
     /// Cones by name; not empty means strategy `listed`.
     pub list: Vec<ConeSpec>,
-    /// Number of cones for `spread`, at least 1; the most that `auto` places in the interior. Absent: 8, but where curvature is
-    /// prescribed on the boundary `auto` places no more than Gauss–Bonnet needs.
+    /// Number of cones for `spread`, at least 1; the most that `auto` places in the interior. Absent: 8, and for `auto` as many as the
+    /// surface needs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub count: Option<usize>,
-    /// For `auto`: as few cones as keep |log scale − mean| below this where `count` allows; absent: `count` of them, as far as they pay.
+    /// For `auto`: as few cones as keep |log scale − mean| below this where `count` allows; absent: as many as pay.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub log_scale_bound: Option<f64>,
     /// For `auto`: K̄ of every cone is a multiple of this; 0: any.
     pub quantum: PiMultiple,
-    /// For `auto`: what is made least.
-    pub objective: ConeObjective,
     /// For `auto`: least K̄ of a cone, in multiples of π.
     pub min_curvature: PiMultiple,
     /// For `auto`: greatest K̄ of a cone, in multiples of π, below 2.
@@ -190,7 +177,6 @@ impl Default for ConeParams {
             count: None,
             log_scale_bound: None,
             quantum: PiMultiple::literal(0, 1),
-            objective: ConeObjective::default(),
             min_curvature: PiMultiple::literal(-4, 1),
             max_curvature: PiMultiple::literal(9, 8),
             boundary_distance: 0.0,
