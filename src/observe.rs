@@ -1,6 +1,6 @@
 //! How a job tells what it is doing, and is told to stop.
 
-use crate::flow::ricci::FlowStep;
+use crate::flow::step::FlowStep;
 
 /// Receives progress. Every method has a default, so `&()` watches nothing.
 pub trait Observer: Sync {

@@ -5,7 +5,8 @@ use crate::atlas::cut::CutGraph;
 use crate::atlas::develop::Development;
 use crate::atlas::geometry_image::{GeometryImage, ImageParams};
 use crate::atlas::patches::PatchLayout;
-use crate::flow::cones::Prescription;
+use crate::flow::prescription::Prescription;
+use crate::flow::refine::ConnectivityRepair;
 use crate::flow::ricci::{FlatMetric, FlowParams};
 use crate::geometry::connectivity::Topology;
 use crate::geometry::ids::VertexVec;
@@ -61,17 +62,6 @@ impl AffineAtlas {
     pub fn limited_by_float64(&self) -> bool {
         self.metric.max_curvature_error > self.flow.curvature_tolerance
     }
-}
-
-/// What connectivity repair changed (tutorial 5.3).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct ConnectivityRepair {
-    /// Edge and face splits.
-    pub splits: usize,
-    /// Edge flips.
-    pub flips: usize,
-    /// Hausdorff distance to the surface before, source units; 0 for splits.
-    pub hausdorff: f64,
 }
 
 /// Minimum, maximum and standard deviation.

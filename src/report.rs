@@ -11,7 +11,7 @@ use crate::atlas::charts::{Chart, ChartKind, Charts, Transition};
 use crate::atlas::cut::CutGraph;
 use crate::atlas::develop::{Development, diameter};
 use crate::atlas::plane::{RigidMotion, distance, doubled_area, wrap_angle};
-use crate::flow::cones::Prescription;
+use crate::flow::prescription::Prescription;
 use crate::flow::ricci::FlatMetric;
 use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId, NONE};
 use crate::geometry::mesh::{Mesh, distance as distance3, triangle_area};

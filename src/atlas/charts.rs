@@ -13,7 +13,7 @@ use crate::atlas::cut::{CutGraph, Segment};
 use crate::atlas::develop::{Board, DevelopError, Development, Placement, Unfolded, Unfolder};
 use crate::atlas::overlay::Layout;
 use crate::atlas::plane::{RigidMotion, distance, doubled_area, rotate, wrap_angle};
-use crate::flow::cones::Prescription;
+use crate::flow::prescription::Prescription;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{ChartId, FaceId, FaceVec, HalfedgeId, SegmentId, VertexId, VertexVec};
 use std::f64::consts::PI;

@@ -10,41 +10,26 @@
 
 mod attributes;
 mod channels;
+mod dilation;
+mod image;
+mod interpolation;
 mod packed;
 mod shared;
 
-pub use attributes::{Sampled, SourceSurface, Values, sample_attributes};
+pub use attributes::{SourceSurface, sample_attributes};
 pub use channels::{Channel, ImageParams, Precision};
+pub(crate) use dilation::nearest_sources;
+pub use image::{GeometryImage, Sampled, Values};
 pub use packed::pack_images;
 
-use crate::atlas::patches::raster::{cover, to_texel};
-use crate::atlas::patches::{Domain, Patch, PatchLayout};
+use crate::atlas::patch::{Patch, PatchLayout};
+use crate::atlas::raster::cover;
 use crate::geometry::ids::{FaceId, NONE, VertexVec};
 use crate::geometry::mesh::{
     AttributeKind, CornerAttribute, Mesh, bounding_box, cross, distance, norm, sub,
 };
+use interpolation::{in_texels, mix, unit};
 use rayon::prelude::*;
-
-/// One sampled patch; row-major, row 0 at the top.
-#[derive(Clone, Debug, PartialEq)]
-pub struct GeometryImage {
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// Surface point minus the image origin; dilated outside the patch.
-    pub position: Vec<[f32; 3]>,
-    /// 1 inside the patch, 0 elsewhere.
-    pub alpha: Vec<f32>,
-    /// Unit normal of the surface; dilated.
-    pub normal: Vec<[f32; 3]>,
-    /// Face of the mesh that the texel lies in; dilated.
-    pub face: Vec<u32>,
-    /// Log scale, interpolated; dilated.
-    pub log_scale: Vec<f32>,
-    /// Attributes of the source, where they were asked for ([`sample_attributes`]); dilated.
-    pub attributes: Vec<Sampled>,
-}
 
 /// A model farther from the origin than this many diagonals of its bounding box gets an image origin.
 const FAR_DIAGONALS: f64 = 10.0;
@@ -141,11 +126,6 @@ fn face_normal(p: [[f64; 3]; 3], size: f64) -> [f64; 3] {
     cross(side(1), side(2))
 }
 
-fn unit(n: [f64; 3]) -> Option<[f64; 3]> {
-    let length = norm(n);
-    (length.is_finite() && length > 0.0).then(|| n.map(|x| x / length))
-}
-
 /// Unit normals of the vertices, weighted by the areas of their faces.
 fn vertex_normals(mesh: &Mesh, size: f64) -> VertexVec<[f64; 3]> {
     let c = &mesh.connectivity;
@@ -161,10 +141,6 @@ fn vertex_normals(mesh: &Mesh, size: f64) -> VertexVec<[f64; 3]> {
     sum.iter()
         .map(|&n| unit(n).unwrap_or([0.0, 0.0, 1.0]))
         .collect()
-}
-
-fn mix<const N: usize>(values: &[[f64; N]; 3], weights: [f64; 3]) -> [f64; N] {
-    std::array::from_fn(|i| (0..3).map(|k| weights[k] * values[k][i]).sum())
 }
 
 fn sample_patch(
@@ -214,20 +190,6 @@ fn sample_patch(
     image
 }
 
-/// A point of a patch in texels, such that texels are sampled at halves. The sides of a rectangle come to lie on the first and the
-/// last column and row to the last bit.
-fn in_texels(patch: &Patch, p: [f64; 2]) -> [f64; 2] {
-    match patch.domain() {
-        Domain::Flat => to_texel(&patch.texel_to_patch, p),
-        Domain::Rectangle => {
-            let height = patch.texel_to_patch[1][2];
-            let last = [patch.width, patch.height].map(|n| n.saturating_sub(1) as f64);
-            let down = (height - p[1]) / height;
-            [p[0] * last[0] + 0.5, down * last[1] + 0.5]
-        }
-    }
-}
-
 impl GeometryImage {
     fn set(&mut self, at: usize, f: FaceId, corners: &Corners, weights: [f64; 3]) {
         let normal = mix(&corners.normal, weights);
@@ -259,134 +221,12 @@ impl GeometryImage {
     }
 }
 
-/// For every texel the nearest source by Euclidean distance, exactly; the one further left, then
-/// further up, where several are as near. A texel is its own source where there is none.
-///
-/// Two passes (Meijster, Roerdink, Hesselink 2000): the nearest source in each column, then along each
-/// row the lower envelope of the parabolas `(x − column)² + distance²`. Whole numbers throughout.
-pub(crate) fn nearest_sources(sources: &[bool], width: usize) -> Vec<usize> {
-    let mut nearest: Vec<usize> = (0..sources.len()).collect();
-    // Where all are sources, as in rectangles, or none is.
-    if width == 0 || !sources.contains(&true) || !sources.contains(&false) {
-        return nearest;
-    }
-    let height = sources.len() / width;
-    // Row of the nearest source in the column, `height` where the column has none.
-    let mut in_column = vec![height; sources.len()];
-    // Row by row, as they lie in memory: the last source above each texel, then the next one below.
-    let mut near = vec![height; width];
-    for (y, (row, sources)) in rows_of(&mut in_column, sources, width) {
-        for (x, near) in near.iter_mut().enumerate() {
-            if sources[x] {
-                *near = y;
-            }
-            row[x] = *near;
-        }
-    }
-    near.fill(height);
-    for (y, (row, sources)) in rows_of(&mut in_column, sources, width).rev() {
-        for (x, next) in near.iter_mut().enumerate() {
-            if sources[x] {
-                *next = y;
-            }
-            let above = row[x];
-            if *next < height && (above == height || *next - y < y - above) {
-                row[x] = *next;
-            }
-        }
-    }
-    // (column, first texel of the row for which it is the nearest)
-    let mut envelope: Vec<(i64, i64)> = Vec::with_capacity(width);
-    for y in 0..height {
-        let row = &in_column[width * y..width * (y + 1)];
-        let squared = |column: i64| {
-            let d = row[column as usize] as i64 - y as i64;
-            d * d
-        };
-        envelope.clear();
-        for column in (0..width as i64).filter(|&c| row[c as usize] < height) {
-            loop {
-                let Some(&(other, from)) = envelope.last() else {
-                    envelope.push((column, 0));
-                    break;
-                };
-                // `column` is strictly nearer than `other` from this texel on.
-                let twice = column * column - other * other + squared(column) - squared(other);
-                let start = twice.div_euclid(2 * (column - other)) + 1;
-                if start > from {
-                    if start < width as i64 {
-                        envelope.push((column, start));
-                    }
-                    break;
-                }
-                envelope.pop();
-            }
-        }
-        let mut at = 0;
-        for x in 0..width {
-            while at + 1 < envelope.len() && envelope[at + 1].1 <= x as i64 {
-                at += 1;
-            }
-            let column = envelope[at].0 as usize;
-            nearest[width * y + x] = width * row[column] + column;
-        }
-    }
-    nearest
-}
-
-/// Rows of two images of one width, numbered.
-fn rows_of<'a>(
-    a: &'a mut [usize],
-    b: &'a [bool],
-    width: usize,
-) -> impl DoubleEndedIterator<Item = (usize, (&'a mut [usize], &'a [bool]))> {
-    a.chunks_exact_mut(width)
-        .zip(b.chunks_exact(width))
-        .enumerate()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::atlas::patch::Domain;
     use crate::atlas::patches::samples::{self, Sample};
     use crate::atlas::patches::{PatchParams, layout};
-
-    #[test]
-    fn nearest_sources_agree_with_brute_force() {
-        let mut state = 3u64;
-        for (width, height, share) in [
-            (17, 11, 4),
-            (1, 30, 8),
-            (30, 1, 8),
-            (24, 24, 60),
-            (5, 5, 25),
-        ] {
-            let mut sources: Vec<bool> = (0..width * height)
-                .map(|_| {
-                    state = state
-                        .wrapping_mul(6364136223846793005)
-                        .wrapping_add(1442695040888963407);
-                    (state >> 33).is_multiple_of(share)
-                })
-                .collect();
-            sources[width * height / 2] = true;
-            let nearest = nearest_sources(&sources, width);
-            for (at, &found) in nearest.iter().enumerate() {
-                let squared = |from: usize| {
-                    let dx = (from % width).abs_diff(at % width);
-                    let dy = (from / width).abs_diff(at / width);
-                    dx * dx + dy * dy
-                };
-                // Nearest, then leftmost, then topmost.
-                let brute = (0..sources.len())
-                    .filter(|&s| sources[s])
-                    .min_by_key(|&s| (squared(s), s % width, s / width));
-                assert_eq!(Some(found), brute);
-            }
-        }
-        assert_eq!(nearest_sources(&[false, false], 2), [0, 1]);
-        assert_eq!(nearest_sources(&[], 0), [0usize; 0]);
-    }
 
     fn sampled(sample: &Sample) -> (PatchLayout, Vec<GeometryImage>) {
         let layout = layout(

@@ -7,7 +7,7 @@
 use super::{cache, limits};
 use crate::config::Config;
 use crate::export::folder::{mark_swept, remove_all_staging};
-use crate::flow::ricci::FlowStep;
+use crate::flow::step::FlowStep;
 use crate::job;
 use crate::observe::Observer;
 use crate::outcome::AssetOutcome;

@@ -1,35 +1,13 @@
 //! Checks a parsed text against [`KEYS`](super::keys::KEYS), where spans are still known.
 
-use super::error::{ConfigError, Location};
+use super::error::ConfigError;
 use super::keys::{self, Kind};
-use super::overrides::OF_THE_RUN;
+use super::scope::OF_THE_RUN;
+use super::source::Source;
 use crate::flow::cones::PiMultiple;
 use std::ops::Range;
-use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-
-/// A configuration text and what to call it.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Source {
-    /// The file as given, or `--set`.
-    pub name: String,
-    /// The text.
-    pub text: Arc<str>,
-}
-
-impl Source {
-    pub fn new(name: &str, text: &str) -> Self {
-        Self {
-            name: name.to_owned(),
-            text: Arc::from(text),
-        }
-    }
-
-    pub fn at(&self, span: Range<usize>) -> Box<Location> {
-        Box::new(Location::new(&self.name, &self.text, span))
-    }
-}
 
 /// Refuses the first key or value of the text that [`KEYS`](super::keys::KEYS) does not allow.
 pub(super) fn check(source: &Source, table: &DeTable<'_>) -> Result<(), ConfigError> {

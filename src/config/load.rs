@@ -1,13 +1,12 @@
 //! From text and overrides to a [`Config`], cones of a cone file included.
 
 use super::Config;
-use super::check::{Source, check};
 use super::error::{ConfigError, Location};
-use super::overrides::{self, Layers, Override};
-use super::presets::Preset;
+use super::layers::{Layers, merge, parse_layer};
+use super::overrides::Override;
+use super::source::Source;
 use crate::flow::cones;
 use std::io::Read;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use toml::de::DeTable;
@@ -185,19 +184,6 @@ pub(super) fn parse_layers(name: &str, text: &str, set: &[String]) -> Result<Lay
     Ok(layers)
 }
 
-/// What the preset sets, if one is named: it lies below everything that the user wrote, wherever its name stands.
-pub(super) fn preset_layer(own: &toml::Table) -> Result<toml::Table, ConfigError> {
-    let Some(preset) = own.get("preset").cloned() else {
-        return Ok(toml::Table::new());
-    };
-    let text = match preset.try_into::<Preset>() {
-        Ok(preset) => preset.settings(),
-        // Each layer was accepted, so the word is known.
-        Err(_) => "",
-    };
-    Ok(parse_layer(&Source::new("preset", text))?.0)
-}
-
 fn read_text(path: &Path) -> Result<String, ConfigError> {
     let unreadable = |reason: String| ConfigError::Unreadable {
         path: path.to_owned(),
@@ -228,60 +214,6 @@ fn read_text(path: &Path) -> Result<String, ConfigError> {
     })
 }
 
-/// Checks one text by itself, so that every error has a place in it. Its `[[asset]]` tables are given apart.
-fn parse_layer(source: &Source) -> Result<(toml::Table, Option<Vec<Override>>), ConfigError> {
-    let checked = DeTable::parse(&source.text).map_err(|error| syntax(source, &error))?;
-    check(source, checked.get_ref())?;
-    toml::from_str::<Config>(&source.text).map_err(|error| refused(source, &error))?;
-    let mut table = toml::from_str(&source.text).map_err(|error| syntax(source, &error))?;
-    let overrides = overrides::take(source, checked.get_ref(), &mut table)?;
-    Ok((table, overrides))
-}
-
-fn syntax(source: &Source, error: &toml::de::Error) -> ConfigError {
-    let at = source.at(error.span().unwrap_or(0..0));
-    let before = source.text[..at.span.start].trim_end();
-    let word = at.offending();
-    // The most frequent slip: the parser takes `scheme = thurston` for a misspelt `true`.
-    let reason = if before.ends_with(['=', '[', ',']) && word.starts_with(char::is_alphabetic) {
-        format!("the word {word} is no value; only true and false stand without quotes")
-    } else {
-        error.message().to_owned()
-    };
-    ConfigError::Syntax { at, reason }
-}
-
-pub(super) fn refused(source: &Source, error: &toml::de::Error) -> ConfigError {
-    let span = error.span().unwrap_or(0..0);
-    ConfigError::Refused {
-        key: key_at(source, span.start).unwrap_or_else(|| "configuration".to_owned()),
-        at: source.at(span),
-        reason: error.message().to_owned(),
-    }
-}
-
-/// Path of the `section.key`, or of the key above all sections, whose value holds byte `position`.
-fn key_at(source: &Source, position: usize) -> Option<String> {
-    let table = DeTable::parse(&source.text).ok()?;
-    let holds = |key: Range<usize>, value: Range<usize>| {
-        (key.start..value.end.max(key.end)).contains(&position)
-    };
-    for (section, keys) in table.get_ref() {
-        let Some(members) = keys.get_ref().as_table() else {
-            if holds(section.span(), keys.span()) {
-                return Some(section.get_ref().to_string());
-            }
-            continue;
-        };
-        for (key, value) in members {
-            if holds(key.span(), value.span()) {
-                return Some(format!("{}.{}", section.get_ref(), key.get_ref()));
-            }
-        }
-    }
-    None
-}
-
 fn override_key(given: &str) -> &str {
     given.split('=').next().unwrap_or(given).trim()
 }
@@ -304,16 +236,4 @@ fn override_source(given: &str) -> Result<Source, ConfigError> {
         format!("{key} = {}", toml::Value::String(value.to_owned()))
     };
     Ok(Source::new("--set", &text))
-}
-
-/// Later values replace earlier ones key by key; lists are replaced as a whole.
-pub(super) fn merge(into: &mut toml::Table, from: toml::Table) {
-    for (key, value) in from {
-        match (into.get_mut(&key), value) {
-            (Some(toml::Value::Table(old)), toml::Value::Table(new)) => merge(old, new),
-            (_, value) => {
-                into.insert(key, value);
-            }
-        }
-    }
 }

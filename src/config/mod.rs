@@ -12,10 +12,13 @@ pub mod assets;
 mod check;
 pub mod error;
 pub mod keys;
+mod layers;
 mod load;
-pub(crate) mod overrides;
+mod overrides;
 mod presets;
+pub(crate) mod scope;
 mod sections;
+mod source;
 
 pub use error::{ConfigError, Location};
 pub use load::{Loaded, defaults, load, parse};

@@ -1,21 +1,11 @@
 //! Settings for some meshes only: the `[[asset]]` tables.
-//!
-//! *Enters:* layers of a configuration, the file's first, then those of `--set`. *Leaves:* the effective [`Config`] of any mesh. A later table wins over an
-//! earlier one, both over the rest of the file, `--set` over all of them; a preset lies below everything, also one that a table names.
 
 use super::Config;
-use super::check::Source;
 use super::error::{ConfigError, Location};
-use super::load::{merge, preset_layer, refused};
-use crate::atlas::patches::Domain;
+use super::scope::SELECTORS;
+use super::source::Source;
 use std::path::Path;
 use toml::de::DeTable;
-
-/// Keys of a table that say for which meshes it is.
-pub(super) const SELECTORS: [&str; 2] = ["glob", "path"];
-/// Keys that concern the whole run.
-pub(crate) const OF_THE_RUN: [&str; 5] =
-    ["asset", "input", "output", "run.jobs", "run.total_memory"];
 
 /// One `[[asset]]` table.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,7 +13,7 @@ pub struct Override {
     /// `glob` or `path` as written.
     pub pattern: String,
     selector: Selector,
-    settings: toml::Table,
+    pub(super) settings: toml::Table,
     /// Where the table stands.
     pub at: Box<Location>,
 }
@@ -60,54 +50,6 @@ impl Override {
 
 fn without_dot(path: &str) -> &str {
     path.strip_prefix("./").unwrap_or(path)
-}
-
-/// All that was written, in layers.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Layers {
-    /// The file without its `[[asset]]` tables.
-    pub file: toml::Table,
-    /// Those of `--set`, as one.
-    pub set: toml::Table,
-    /// The `[[asset]]` tables.
-    pub overrides: Vec<Override>,
-    /// What to name where the merged layers do not fit each other.
-    pub last: Option<Source>,
-}
-
-impl Layers {
-    /// The configuration with these of the overrides. A cone file is not read.
-    pub fn config(&self, overrides: &[usize]) -> Result<Config, ConfigError> {
-        let mut own = self.file.clone();
-        for &i in overrides {
-            merge(&mut own, self.overrides[i].settings.clone());
-        }
-        merge(&mut own, self.set.clone());
-        let mut merged = preset_layer(&own)?;
-        merge(&mut merged, own);
-        // Each layer was accepted alone and a key is replaced as a whole, so this can only fail where
-        // a stage relates several of its keys.
-        let config: Result<Config, toml::de::Error> = toml::Value::Table(merged).try_into();
-        let nowhere = Source::new("configuration", "");
-        let source = self.last.as_ref().unwrap_or(&nowhere);
-        let config = config.map_err(|error| refused(source, &error))?;
-        match only_flat(&config) {
-            Some((key, does)) if config.images.domain == Domain::Rectangle => {
-                Err(ConfigError::OnlyFlat { key, does })
-            }
-            _ => Ok(config),
-        }
-    }
-}
-
-/// A key that is given and means nothing but for flat images, and what it does with them.
-fn only_flat(config: &Config) -> Option<(&'static str, &'static str)> {
-    let patches = &config.patches;
-    if patches.packed_side.is_some() {
-        return Some(("patches.packed_side", "packs flat images into one"));
-    }
-    let shared = ("patches.shared_lattice", "is for flat images");
-    patches.shared_lattice.then_some(shared)
 }
 
 /// Takes the `[[asset]]` tables out of a layer whose keys have been checked.

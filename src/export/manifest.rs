@@ -3,7 +3,7 @@
 //! The only output file that holds wall time and memory. Lines stand in the order of the assets'
 //! ids; the file is replaced in one step, so that a reader never meets half a line.
 
-use crate::export::{Action, ExportError, folder};
+use crate::export::{Action, ExportError, folder, names};
 use crate::outcome::{AssetOutcome, AssetState, FailureKind};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ use std::io::{self, BufRead, BufReader, Write};
 use std::path::Path;
 
 /// Name of the file in the output root.
-pub const FILE_NAME: &str = "manifest.jsonl";
+pub const FILE_NAME: &str = names::MANIFEST;
 
 /// What became of an asset or a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]

@@ -5,7 +5,7 @@
 
 use crate::atlas::charts::ChartFace;
 use crate::export::EncodeError;
-use crate::flow::cones::BoundaryCondition;
+use crate::flow::prescription::BoundaryCondition;
 use crate::geometry::ids::{EdgeId, FaceId, NONE, PatchId};
 use crate::product::AffineAtlas;
 use npyz::{AutoSerialize, WriterBuilder};

@@ -10,7 +10,8 @@ use crate::atlas::geometry_image::{GeometryImage, ImageParams};
 use crate::atlas::patches::{Patch, PatchLayout, Seam, SeamSample};
 use crate::atlas::plane::{RigidMotion, Similarity, distance};
 use crate::export::Provenance;
-use crate::flow::cones::{BoundaryCondition, Prescription};
+use crate::flow::prescription::{BoundaryCondition, Prescription};
+use crate::flow::refine::ConnectivityRepair;
 use crate::flow::ricci::{FlatMetric, FlowParams, FlowStep};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{
@@ -20,7 +21,7 @@ use crate::geometry::mesh::{
     Appearance, AttributeKind, CornerAttribute, EmbeddedImage, Material, Mesh, Part, Texture,
     TextureUse, triangle_area,
 };
-use crate::product::{AffineAtlas, ConnectivityRepair, Quality};
+use crate::product::{AffineAtlas, Quality};
 use crate::repair::RepairLog;
 use std::f64::consts::TAU;
 

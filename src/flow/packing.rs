@@ -17,7 +17,6 @@
 //! satisfies (6), nor that it looks like the surface: lengths of well-shaped meshes are kept to a few per cent.
 //! Taking γ as the minimum over faces instead, as is customary, puts Φ = 0 on every edge.
 
-use crate::flow::ricci::PackingFit;
 use crate::flow::solve::{SolveError, SymmetricSolver};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, VertexVec};
@@ -32,6 +31,19 @@ const GRADIENT_TOLERANCE: f64 = 1e-10;
 const MAX_STEPS: usize = 200;
 /// Smallest radius, relative to the shortest edge at its vertex.
 const RADIUS_FLOOR: f64 = 1e-3;
+
+/// How well a circle packing keeps the lengths in space (1).
+#[derive(
+    Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
+pub struct PackingFit {
+    /// Mean over the edges of |l − l̄| / l̄.
+    pub mean_length_error: f64,
+    /// Largest |l − l̄| / l̄.
+    pub max_length_error: f64,
+    /// Share of the edges whose Φ lies at an end of [0, π/2].
+    pub clamped: f64,
+}
 
 /// Radii and intersection angles.
 #[derive(Clone, Debug)]

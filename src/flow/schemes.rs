@@ -16,12 +16,36 @@
 //!
 //! with γ = e^u for the three packings, which are one scheme with different I (I = 1, cos Φ, or anything ≥ 0).
 
-use crate::flow::packing::{self, PackingError};
-use crate::flow::ricci::{PackingFit, Scheme};
+use crate::flow::packing::{self, PackingError, PackingFit};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, VertexId, VertexVec};
 use crate::geometry::triangle;
 use std::f64::consts::PI;
+
+/// Which conformal structure turns `u` into lengths.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    serde::Serialize,
+    serde::Deserialize,
+    schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scheme {
+    /// l = γi + γj (Φ ≡ 0).
+    Tangential,
+    /// (2) with Φ from (1).
+    Thurston,
+    /// l² = γi² + γj² + 2Iγiγj with the initial lengths exact.
+    InversiveDistance,
+    /// l = e^{(ui + uj)/2} l⁰.
+    #[default]
+    VertexScaling,
+}
 
 /// What stays fixed while `u` moves.
 #[derive(Clone, Debug)]

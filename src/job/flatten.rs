@@ -8,13 +8,13 @@ use super::BuildError;
 use crate::atlas::cut::{self, CutGraph};
 use crate::atlas::overlay::{self, Layout, Overlay};
 use crate::config::Config;
-use crate::flow::cones::Prescription;
+use crate::flow::prescription::Prescription;
+use crate::flow::refine::ConnectivityRepair;
 use crate::flow::refine::{self, RefineError};
 use crate::flow::ricci::{self, FlatMetric};
 use crate::geometry::ids::EdgeVec;
 use crate::geometry::mesh::Mesh;
 use crate::observe::Observer;
-use crate::product::ConnectivityRepair;
 
 /// A slit surface with a flat metric, before it is developed.
 pub(super) struct Flattened {

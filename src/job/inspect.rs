@@ -2,15 +2,16 @@
 
 mod existence;
 
-use super::{BuildError, listing, refine_for};
+use super::listing::{self, counted};
+use super::{BuildError, refine_for};
 use crate::config::Config;
 use crate::export::ExportError;
 use crate::export::glb::region::{self, RegionOf};
 use crate::flow::cones::{self, BoundaryCondition, Prescription, in_pi};
 use crate::flow::refine;
+use crate::flow::refine::ConnectivityRepair;
 use crate::geometry::mesh::Mesh;
 use crate::outcome::Failure;
-use crate::product::ConnectivityRepair;
 use crate::read;
 use crate::repair::{self, Component};
 use existence::Verdict;
@@ -173,9 +174,4 @@ fn describe(
     for words in listing::cones(mesh, prescription) {
         line(format!("  {words}"));
     }
-}
-
-/// A count with its noun.
-pub(super) fn counted(count: usize, one: &str, several: &str) -> String {
-    format!("{count} {}", if count == 1 { one } else { several })
 }

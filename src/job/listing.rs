@@ -1,6 +1,5 @@
 //! The cones of a prescription in words, a line a group.
 
-use super::inspect::counted;
 use crate::flow::cones::{Prescription, in_pi};
 use crate::geometry::mesh::Mesh;
 use std::f64::consts::PI;
@@ -9,6 +8,11 @@ use std::f64::consts::PI;
 const LISTED: usize = 12;
 /// Longer curvatures are rounded.
 const SHORT: usize = 7;
+
+/// A count with its noun.
+pub(super) fn counted(count: usize, one: &str, several: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { several })
+}
 
 /// Vertices that get the same curvature, as far as it is shown.
 struct Group {
@@ -112,7 +116,7 @@ fn few(names: &[String]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flow::cones::BoundaryCondition;
+    use crate::flow::prescription::BoundaryCondition;
     use crate::geometry::ids::{VertexId, VertexVec};
     use crate::geometry::mesh::Soup;
     use crate::repair::{RepairParams, repair};

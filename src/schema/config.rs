@@ -3,7 +3,7 @@
 use super::DRAFT;
 use crate::config::COMMENTED_DEFAULT;
 use crate::config::keys::{KEYS, Key, Kind};
-use crate::config::overrides::OF_THE_RUN;
+use crate::config::scope::OF_THE_RUN;
 use serde_json::{Map, Value, json};
 
 /// A curvature as text: a number, a fraction, or an angle in radians.

@@ -11,7 +11,7 @@ use super::exemplar::{Exemplar, to_pixel};
 use super::field::Field;
 use super::gaussian::Complex;
 use crate::atlas::geometry_image::nearest_sources;
-use crate::atlas::patches::raster::cover;
+use crate::atlas::raster::cover;
 use crate::geometry::ids::NONE;
 use crate::read::flat::FlatSurface;
 use rayon::prelude::*;

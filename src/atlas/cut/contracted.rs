@@ -1,7 +1,7 @@
 //! Shortest paths, homotopy basis and connections on the surface with every boundary loop contracted to a point.
 
 use super::paths::{Search, Ways};
-use crate::flow::cones::Prescription;
+use crate::flow::prescription::Prescription;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::disjoint_sets::UnionFind;
 use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, NONE, VertexId, VertexVec};

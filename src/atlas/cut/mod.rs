@@ -14,7 +14,7 @@
 mod contracted;
 mod paths;
 
-use crate::flow::cones::Prescription;
+use crate::flow::prescription::Prescription;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceVec, HalfedgeId, HalfedgeVec, NONE, VertexId, VertexVec};
 use contracted::Contracted;

@@ -10,46 +10,14 @@
 //! the other channels.
 
 use super::channels::{Channel, ImageParams};
-use super::{GeometryImage, in_texels, mix, nearest_sources, unit};
-use crate::atlas::patches::raster::cover;
-use crate::atlas::patches::{Patch, PatchLayout};
+use super::dilation::nearest_sources;
+use super::image::{GeometryImage, Sampled, Values};
+use super::interpolation::{in_texels, mix, unit};
+use crate::atlas::patch::{Patch, PatchLayout};
+use crate::atlas::raster::cover;
 use crate::geometry::ids::{FaceId, NONE, VertexVec};
 use crate::geometry::mesh::{CornerAttribute, Mesh, cross, sub};
 use rayon::prelude::*;
-
-/// One attribute of the source over an image.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Sampled {
-    /// What it is.
-    pub channel: Channel,
-    /// The values.
-    pub values: Values,
-}
-
-/// Values of all texels, row by row.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Values {
-    /// So many numbers a texel, one after another.
-    Numbers {
-        /// How many.
-        components: usize,
-        /// Texels × components.
-        values: Vec<f32>,
-    },
-    /// A number of something, or [`NONE`].
-    Ids(Vec<u32>),
-}
-
-impl Values {
-    /// How many texels they are for.
-    #[must_use]
-    pub fn texels(&self) -> usize {
-        match self {
-            Self::Numbers { components, values } => values.len() / (*components).max(1),
-            Self::Ids(ids) => ids.len(),
-        }
-    }
-}
 
 /// The surface as it came out of repair, where its faces are the source's own (or parts of these), with what is to be sampled on it.
 #[derive(Clone, Debug)]

@@ -1,6 +1,6 @@
 //! What is stored in an image beside position and mask, and how.
 
-use crate::atlas::patches::Domain;
+use crate::atlas::patch::Domain;
 use crate::geometry::ids::NONE;
 use crate::geometry::mesh::{AttributeKind, CornerAttribute, Soup};
 use serde::{Deserialize, Serialize};

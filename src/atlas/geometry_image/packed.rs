@@ -4,9 +4,9 @@
 //! *Guaranteed:* inside the box of an image all channels are that image's, bit for bit; in between they are those of the nearest
 //! texel of any image, with mask 0.
 
-use super::attributes::{Sampled, Values};
-use super::{GeometryImage, nearest_sources};
-use crate::atlas::patches::PackedPlaces;
+use super::dilation::nearest_sources;
+use super::image::{GeometryImage, Sampled, Values};
+use crate::atlas::patch::PackedPlaces;
 use crate::geometry::ids::NONE;
 
 /// Puts the images of all patches into one; all must hold the same attributes, and lie inside the square.

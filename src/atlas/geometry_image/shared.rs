@@ -6,8 +6,8 @@
 //! Both were sampled at the same fraction of the same edge, but each with the third corner of its own face and in its own direction.
 //! Seldom does this survive the rounding to `f32`; where it does the left one counts. Normals and faces stay each side's own.
 
-use super::GeometryImage;
-use crate::atlas::patches::{Domain, Patch, PatchLayout};
+use super::image::GeometryImage;
+use crate::atlas::patch::{Domain, Patch, PatchLayout};
 use std::collections::BTreeSet;
 
 /// A side of an image: 0 is the bottom, then counterclockwise.

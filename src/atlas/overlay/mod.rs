@@ -27,9 +27,9 @@ mod tests;
 pub use layout::{Carrier, Layout};
 pub use regions::OnBase;
 
-use crate::flow::cones::Prescription;
 use crate::flow::correspondence::{CorrespondenceError, Curves};
 use crate::flow::intrinsic::Intrinsic;
+use crate::flow::prescription::Prescription;
 use crate::flow::ricci::FlatMetric;
 use crate::geometry::connectivity::{Connectivity, ConnectivityError};
 use crate::geometry::ids::{EdgeId, EdgeVec, HalfedgeId, HalfedgeVec, NONE, VertexVec};

@@ -11,7 +11,7 @@
 //! Where nothing bends a texel still is of use, to normals and to what is laid over the images. So none is wider than [`COARSEST`] times what an even spread
 //! over the surface gives.
 
-use super::PatchParams;
+use super::params::PatchParams;
 
 /// Most widths of an even texel. A quarter of the texels at the least.
 const COARSEST: f64 = 2.0;

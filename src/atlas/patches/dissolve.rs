@@ -6,10 +6,9 @@
 //!
 //! Every single step keeps all patches disks, injective and inside the range of log scale.
 
-use super::merge::around;
+use super::borders::{around, borders};
 use super::overlap::overlap;
 use super::placement::{Placement, TOUCHING, centroid, place};
-use super::segment::borders;
 use super::slit::Slit;
 use crate::atlas::plane;
 use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId};

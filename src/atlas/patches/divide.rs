@@ -14,11 +14,11 @@
 mod candidates;
 mod unite;
 
-use super::PatchParams;
 use super::bend::Bends;
 use super::demand::{self, Budget, Demand, Sums};
 use super::holes::split_at_holes;
 use super::overlap::Triangle;
+use super::params::PatchParams;
 use super::placement::{Placement, place};
 use super::rectangle::smallest;
 use super::resolution::coarsest;

@@ -7,9 +7,12 @@
 //! it is what was given.
 
 use super::demand::Sums;
+use super::params::{PatchError, PatchParams};
+use super::places::with_images;
 use super::rectangle::{Directions, in_rectangle};
-use super::{PatchError, PatchLayout, PatchParams, seams, with_images};
+use super::seams::seams;
 use crate::atlas::cut::slit_copies;
+use crate::atlas::patch::PatchLayout;
 use crate::atlas::plane::doubled_area;
 use crate::geometry::disjoint_sets::UnionFind;
 use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, FaceVec, PatchId};

@@ -10,9 +10,10 @@
 //! A texel's width is one of a power of two apart, so budgets are met less exactly than without a lattice; of a few first widths between two powers the one with the least error is taken.
 
 use super::demand::{self, Sums};
+use super::params::PatchParams;
 use super::rectangle::Oriented;
 use super::resolution::{Raster, coarsest_of, covered, demands, densest, least_covered, stretched};
-use super::{MAX_SIDE, PatchParams};
+use crate::atlas::patch::MAX_SIDE;
 use crate::atlas::plane::rotate;
 use rayon::prelude::*;
 
@@ -121,8 +122,8 @@ fn on_lattice(patch: &Oriented, width: f64, params: &PatchParams) -> Raster {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::atlas::patches::raster::to_texel;
     use crate::atlas::patches::rectangle::{Directions, in_rectangle};
+    use crate::atlas::raster::to_texel;
     use std::f64::consts::FRAC_PI_4;
 
     /// A patch that is a square on its corner, which fills half of its rectangle, or is squeezed.

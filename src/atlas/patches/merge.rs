@@ -1,10 +1,10 @@
 //! Neighbouring patches joined while their union is still a disk, injective, and within the range of
 //! log scale. Smallest first, so that crumbs disappear into what surrounds them.
 
+use super::borders::{around, borders};
 use super::placement::{place, rounded_ln};
-use super::segment::borders;
 use super::slit::Slit;
-use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId};
+use crate::geometry::ids::{FaceId, FaceVec};
 use rustc_hash::FxHashSet as Set;
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
@@ -153,22 +153,6 @@ pub(super) fn joins_to_a_disk(
         }
     }
     vertices == edges + 1
-}
-
-/// The other faces at the tail of a halfedge, on its copy of the slit disk; a face may come twice.
-pub(super) fn around<'a>(slit: &'a Slit, start: HalfedgeId) -> impl Iterator<Item = FaceId> + 'a {
-    let c = slit.connectivity;
-    let turn = move |forward: bool| {
-        std::iter::successors(Some(start), move |&h| {
-            let next = if forward {
-                slit.across(c.prev(h))
-            } else {
-                slit.across(h).map(|t| c.next(t))
-            };
-            next.filter(|&n| n != start)
-        })
-    };
-    turn(true).chain(turn(false)).map(move |h| c.face(h))
 }
 
 /// True where two patches, by their labels, overlap.

@@ -16,6 +16,7 @@
 //! a domain that does not.
 
 mod bend;
+mod borders;
 mod coverage;
 mod demand;
 mod dissolve;
@@ -26,9 +27,9 @@ mod lattice;
 mod merge;
 mod overlap;
 mod packing;
+mod params;
 mod placement;
 mod places;
-pub(crate) mod raster;
 mod rectangle;
 mod resolution;
 mod seams;
@@ -46,7 +47,9 @@ use crate::atlas::cut::CutGraph;
 use crate::atlas::develop::{Development, Unfolded};
 use crate::atlas::geometry_image::{image_origin, sample};
 use crate::atlas::overlay::Layout;
-use crate::atlas::plane::Similarity;
+pub use crate::atlas::patch::{
+    Domain, MAX_SIDE, PackedPlaces, Patch, PatchLayout, Seam, SeamSample,
+};
 use crate::atlas::texels::{Bend, FINER};
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, PatchId, VertexVec};
 use crate::geometry::mesh::Mesh;
@@ -54,10 +57,11 @@ pub(crate) use bend::edge_bends;
 use demand::Sums;
 use divide::Divider;
 pub use given::charts_of;
+pub use params::{PatchError, PatchParams};
 pub(crate) use places::packed;
 use places::{Placed, images, with_images};
 use rayon::prelude::*;
-use rectangle::{Directions, Oriented};
+use rectangle::Oriented;
 use resolution::Raster;
 pub(crate) use seams::seams;
 use slit::Slit;
@@ -65,228 +69,8 @@ pub(super) use slit::apex;
 #[cfg(test)]
 pub(crate) use slit::own_development_error;
 
-/// Most texels on a side of an image.
-pub const MAX_SIDE: usize = 8192;
-
-/// Fewer texels on a side of the packed image hold no patches worth the name.
-const LEAST_PACKED_SIDE: usize = 64;
 /// A range of log scales that bounds nothing: lengths differ by a factor of 5·10²¹.
 const WIDEST_RANGE: f64 = 50.0;
-
-/// The domain of one geometry image.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Patch {
-    /// Patch coordinates to central-chart coordinates; none for a rectangle, which is no similar picture of it.
-    pub to_chart: Option<Similarity>,
-    /// Columns of the image.
-    pub width: usize,
-    /// Rows of the image.
-    pub height: usize,
-    /// (column, row, 1), row 0 at the top, to patch coordinates. The centre of texel (0, 0) is (0.5, 0.5), and there a flat
-    /// patch is sampled; a rectangle is sampled at whole numbers, from (0, 0) at its upper left corner on.
-    pub texel_to_patch: [[f64; 3]; 2],
-    /// Where the patch lies in the packed unit square: `packed = uv * scale + offset`, v up.
-    pub packed_scale: f64,
-    /// See `packed_scale`.
-    pub packed_offset: [f64; 2],
-}
-
-impl Patch {
-    /// How texels lie in it.
-    pub fn domain(&self) -> Domain {
-        match self.to_chart {
-            Some(_) => Domain::Flat,
-            None => Domain::Rectangle,
-        }
-    }
-}
-
-/// What geometry images are sampled over.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    serde::Serialize,
-    serde::Deserialize,
-    schemars::JsonSchema,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum Domain {
-    /// A similarity of the central chart, sampled at texel centres, with a mask.
-    #[default]
-    Flat,
-    /// A rectangle, sampled at grid corners from border to border: a full grid.
-    Rectangle,
-}
-
-impl Domain {
-    /// A map of an image as a map of (column + ½, row + ½, 1), whichever points it holds: texel centres, or grid corners.
-    #[must_use]
-    pub fn to_centres(self, texel_to_patch: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
-        match self {
-            Self::Flat => texel_to_patch,
-            Self::Rectangle => texel_to_patch.map(|[a, b, c]| [a, b, c - 0.5 * (a + b)]),
-        }
-    }
-}
-
-/// A maximal chain along which two patches meet, or a patch meets itself or the surface's boundary; or a part of the cut, wherever it is.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Seam {
-    /// Patch on the left of the chain.
-    pub left: PatchId,
-    /// Patch on the right; none at a surface boundary.
-    pub right: Option<PatchId>,
-    /// Samples in order; the first again at the end of a closed seam.
-    pub samples: Vec<SeamSample>,
-}
-
-impl Seam {
-    /// Whether both sides have the same coordinates in one patch. Inside a rectangle, which may lie across the cut, this is no border; where a flat patch is slit open it is.
-    pub fn is_inner(&self) -> bool {
-        self.right == Some(self.left) && self.samples.iter().all(|s| s.left == s.right)
-    }
-}
-
-/// A point of a seam, the same for both sides.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SeamSample {
-    /// In space.
-    pub position: [f64; 3],
-    /// In the left patch.
-    pub left: [f64; 2],
-    /// In the right patch; NaN at a surface boundary.
-    pub right: [f64; 2],
-}
-
-/// All patches of one component.
-#[derive(Clone, Debug)]
-pub struct PatchLayout {
-    /// Patch of every face.
-    pub face_patch: FaceVec<PatchId>,
-    /// Patch coordinates of the corners of every face.
-    pub uv: FaceVec<[[f64; 2]; 3]>,
-    /// The patches.
-    pub patches: Vec<Patch>,
-    /// Their common borders.
-    pub seams: Vec<Seam>,
-    /// Where flat images lie in one image of all, if one was asked for.
-    pub packed: Option<PackedPlaces>,
-}
-
-/// The packed square as an image: texel for texel the images of the patches, each in a place of its own.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PackedPlaces {
-    /// Columns and rows. The unit square of packed coordinates is all of it.
-    pub side: usize,
-    /// Column and row, from the top, of the upper left texel of each image.
-    pub corners: Vec<[usize; 2]>,
-}
-
-/// Parameters of patches and packing.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct PatchParams {
-    /// Largest log-scale range inside a patch (natural logarithm of the length scale).
-    pub log_scale_range: f64,
-    /// Texels of all images of a component together (about).
-    pub texel_budget: usize,
-    /// Least texels on the longer side of an image. Beyond that a patch keeps half as many, and at most 8, on its shorter side, and some inside,
-    /// so that a budget too small for all patches together is exceeded.
-    pub min_side: usize,
-    /// Texels between patches in the packed square, and around each image.
-    pub padding: usize,
-    /// Most patches: where there are more, `log_scale_range` is doubled until there are not, or it is as wide as a configuration may ask for.
-    pub max_count: Option<usize>,
-    /// Columns and rows of one image of all flat patches. Patches get fewer texels than the budget has where they would not fit.
-    pub packed_side: Option<usize>,
-    /// Texels of all flat patches on one lattice of the central chart: square, parallel to its axes, each size a power of two times the others. Off: texels of each patch as
-    /// long and as wide as suits it.
-    pub shared_lattice: bool,
-}
-
-impl Default for PatchParams {
-    fn default() -> Self {
-        Self {
-            log_scale_range: 2.0,
-            texel_budget: 512 * 512,
-            min_side: 16,
-            padding: 2,
-            max_count: None,
-            packed_side: None,
-            shared_lattice: false,
-        }
-    }
-}
-
-/// Why there are no patches.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum PatchError {
-    /// A parameter is out of its range.
-    #[error("patches.{name} is {value}; set it to a number from {least} to {most}")]
-    Parameter {
-        /// Name of the parameter.
-        name: &'static str,
-        /// What was given.
-        value: f64,
-        /// Least allowed.
-        least: f64,
-        /// Most allowed.
-        most: f64,
-    },
-    /// The central chart or the metric has no numbers for a face.
-    #[error(
-        "face {face} has no finite place in the plane (coordinate or flat length {value}); its scale is beyond what can be computed, use more cones or smaller ones"
-    )]
-    NotFinite {
-        /// The face.
-        face: u32,
-        /// The number.
-        value: f64,
-    },
-}
-
-impl PatchParams {
-    /// The directions that rectangles around patches may have.
-    fn directions(&self) -> Directions {
-        if self.shared_lattice {
-            Directions::Axes
-        } else {
-            Directions::Any
-        }
-    }
-
-    /// Refuses values that no layout can have.
-    pub fn validate(&self) -> Result<(), PatchError> {
-        let bounds = [
-            ("log_scale_range", self.log_scale_range, 1e-3, 1e3),
-            ("texel_budget", self.texel_budget as f64, 1.0, 1e9),
-            ("min_side", self.min_side as f64, 1.0, 4096.0),
-            ("padding", self.padding as f64, 0.0, 64.0),
-            ("max_count", self.max_count.unwrap_or(1) as f64, 1.0, 1e9),
-            (
-                "packed_side",
-                self.packed_side.unwrap_or(LEAST_PACKED_SIDE) as f64,
-                LEAST_PACKED_SIDE as f64,
-                MAX_SIDE as f64,
-            ),
-        ];
-        for (name, value, least, most) in bounds {
-            if !(least..=most).contains(&value) {
-                return Err(PatchError::Parameter {
-                    name,
-                    value,
-                    least,
-                    most,
-                });
-            }
-        }
-        Ok(())
-    }
-}
 
 /// Divides the central chart into patches, gives each an image size and a place in the packed square, and
 /// finds the seams.

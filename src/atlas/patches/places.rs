@@ -3,9 +3,11 @@
 //! *Enters:* patches in their own coordinates, with areas and bends. *Leaves:* [`Patch`]es, and the places of their images in one image of all where that is wanted.
 
 use super::demand::Sums;
+use super::params::PatchParams;
 use super::rectangle::Oriented;
 use super::resolution::{self, Raster};
-use super::{PackedPlaces, Patch, PatchParams, lattice, packing};
+use super::{lattice, packing};
+use crate::atlas::patch::{PackedPlaces, Patch};
 
 /// Gives patches images of square texels and their places in the packed square.
 pub(super) fn with_images(

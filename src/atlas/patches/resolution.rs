@@ -5,9 +5,10 @@
 //! numbers of their own ([`adapted`]), since on a tube texels along it may be longer.
 
 use super::demand::{self, Demand, Sums};
-use super::raster::{cover, to_texel};
+use super::params::PatchParams;
 use super::rectangle::Oriented;
-use super::{MAX_SIDE, PatchParams};
+use crate::atlas::patch::MAX_SIDE;
+use crate::atlas::raster::{cover, to_texel};
 use crate::atlas::texels::{Bend, Shares};
 
 /// Least texels on the shorter side, where that does not make the longer one absurd …

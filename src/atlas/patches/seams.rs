@@ -1,6 +1,6 @@
 //! Seams: where patches meet each other, themselves across the cut, or the surface's boundary.
 
-use super::{Seam, SeamSample};
+use crate::atlas::patch::{Seam, SeamSample};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceVec, HalfedgeId, PatchId, VertexVec};
 use crate::geometry::mesh::Mesh;

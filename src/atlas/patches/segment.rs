@@ -13,7 +13,6 @@
 //! Everything that is compared is rounded first and ties go to the lower id, so that a change in the
 //! last digits of the metric does not change the patches.
 
-use super::Domain;
 use super::coverage::Coverage;
 use super::dissolve::{dissolve, widen};
 use super::holes::split_at_holes;
@@ -22,9 +21,10 @@ use super::overlap::Triangle;
 use super::placement::{Placement, centroid, place, rounded_ln};
 use super::sets::{Sets, in_order, partition};
 use super::slit::Slit;
-use crate::geometry::ids::{FaceId, FaceVec};
+use crate::atlas::patch::Domain;
+use crate::geometry::ids::FaceId;
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BinaryHeap;
 
 /// Patches are grown in a window of this part of the allowed range. What is left of it lets them take in the
 /// crumbs at the window's border afterwards, where single faces lie just outside.
@@ -231,25 +231,4 @@ fn grow(
         }
     }
     grown
-}
-
-/// Border length in space between a patch and each of its neighbours on the slit disk.
-pub(super) fn borders(
-    slit: &Slit,
-    faces: &[FaceId],
-    label: &FaceVec<u32>,
-    own: u32,
-) -> BTreeMap<u32, f64> {
-    let mut borders = BTreeMap::new();
-    for &f in faces {
-        for h in slit.connectivity.face_halfedges(f) {
-            if let Some(n) = slit.beside(h) {
-                let other = label[n];
-                if other != own {
-                    *borders.entry(other).or_insert(0.0) += slit.source_length(h);
-                }
-            }
-        }
-    }
-    borders
 }

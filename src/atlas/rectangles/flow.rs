@@ -11,7 +11,7 @@ use super::diagonals;
 use super::quads::Quad;
 use super::subdivision::{Corner, Subdivision};
 use crate::atlas::overlay::{self, Carrier, Layout, OnBase, Overlay};
-use crate::flow::cones::{BoundaryCondition, Prescription};
+use crate::flow::prescription::{BoundaryCondition, Prescription};
 use crate::flow::ricci::{self, FlowParams};
 use crate::geometry::ids::{EdgeId, FaceVec, HalfedgeId, HalfedgeVec, NONE, VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;

@@ -9,7 +9,7 @@ use super::subdivision::Subdivision;
 use crate::atlas::charts::{Chart, ChartFace, Charts, Transition};
 use crate::atlas::cut::{CutGraph, Segment, slit_copies};
 use crate::atlas::develop::Development;
-use crate::flow::cones::Prescription;
+use crate::flow::prescription::Prescription;
 use crate::flow::ricci::FlatMetric;
 use crate::geometry::ids::{
     EdgeId, EdgeVec, FaceId, FaceVec, HalfedgeId, NONE, VertexId, VertexVec,

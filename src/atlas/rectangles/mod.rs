@@ -60,7 +60,7 @@ use crate::atlas::cut::CutGraph;
 use crate::atlas::develop::Development;
 use crate::atlas::overlay::OverlayError;
 use crate::atlas::patches::{PatchLayout, PatchParams};
-use crate::flow::cones::Prescription;
+use crate::flow::prescription::Prescription;
 use crate::flow::ricci::{FlatMetric, FlowError};
 use crate::flow::solve::SolveError;
 use crate::geometry::connectivity::ConnectivityError;

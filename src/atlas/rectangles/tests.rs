@@ -14,7 +14,7 @@ use super::walls::{self, Fractions};
 use super::{RectangleError, division, flow, place};
 use crate::atlas::cut::cut;
 use crate::atlas::plane::{distance, doubled_area};
-use crate::flow::cones::{BoundaryCondition, Prescription};
+use crate::flow::prescription::{BoundaryCondition, Prescription};
 use crate::geometry::ids::{FaceVec, HalfedgeId, PatchId, VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
 use crate::geometry::polycube::{lengths, polycube};

@@ -7,8 +7,8 @@
 //! products of powers, so in the logarithms of the numbers this is a convex problem (R. J. Duffin, E. L. Peterson, C. Zener, *Geometric
 //! programming*, 1967), and going through the numbers one after another finds its solution.
 
-use super::Bend;
-use crate::atlas::patches::MAX_SIDE;
+use super::bend::Bend;
+use crate::atlas::patch::MAX_SIDE;
 
 /// Where nothing bends, texels are of use to normals and to what is laid over the images: none is longer than so many even ones.
 const COARSEST: f64 = 2.0;

@@ -2,10 +2,14 @@
 
 use crate::atlas::geometry_image::{Channel, Precision};
 use crate::atlas::patches::Domain;
+use crate::flow::refine::ConnectivityRepair;
 use crate::flow::ricci::{FlowStep, PackingFit, Scheme, Solver};
-use crate::product::{ConnectivityRepair, Quality};
+use crate::product::Quality;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+
+/// Version of the output contract that this module writes.
+pub const FORMAT_VERSION: u32 = 1;
 
 /// The whole document.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -14,7 +18,7 @@ pub struct Document {
     #[schemars(extend("const" = "affine-atlas"))]
     pub format: String,
     /// Version of the format.
-    #[schemars(extend("const" = super::FORMAT_VERSION))]
+    #[schemars(extend("const" = FORMAT_VERSION))]
     pub version: u32,
     /// Program that wrote it.
     pub generator: Generator,

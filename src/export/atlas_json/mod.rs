@@ -11,13 +11,10 @@ use crate::atlas::charts::ChartKind;
 use crate::atlas::geometry_image::ImageParams;
 use crate::atlas::plane::{RigidMotion, wrap_angle};
 use crate::export::{ExportError, Provenance, periods};
-use crate::flow::cones::BoundaryCondition;
+use crate::flow::prescription::BoundaryCondition;
 use crate::geometry::ids::NONE;
 use crate::product::AffineAtlas;
 use std::f64::consts::FRAC_PI_2;
-
-/// Version of the output contract that this module writes.
-pub const FORMAT_VERSION: u32 = 1;
 
 /// Largest distance from a multiple of π/2 at which a rotation counts as a quarter turn, radians.
 pub const QUARTER_TURN_TOLERANCE: f64 = 1e-8;

@@ -11,7 +11,11 @@
 
 mod unfinished;
 
-use crate::export::{Action, ExportError, index};
+pub use crate::export::names::component_name;
+pub(crate) use crate::export::names::{RESERVED, is_asset_name};
+
+use crate::export::names::asset_name;
+use crate::export::{Action, ExportError};
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -19,11 +23,6 @@ use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Component, Path, PathBuf};
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 use unfinished::{process_is_gone, remove_folder, replace, staging_name, sweep, unfinished_name};
-
-/// The folder of one component of an asset that has several.
-pub fn component_name(component: usize) -> String {
-    format!("component-{component:03}")
-}
 
 /// Removes the staging folders of this process and refuses every further write, for the handler of
 /// Ctrl-C. A folder that is just being put in place is waited for: it is finished and stays.
@@ -366,32 +365,6 @@ pub fn list_files(folder: &Path) -> Result<Vec<String>, ExportError> {
     }
     files.sort();
     Ok(files)
-}
-
-/// Names in the output root that are not those of assets.
-pub(crate) const RESERVED: [&str; 5] = [
-    index::FILE_NAME,
-    index::HISTORY_NAME,
-    "junit.xml",
-    "logs",
-    "manifest.jsonl",
-];
-
-/// Whether a folder can have this name without meeting our own names.
-pub(crate) fn is_asset_name(name: &str) -> bool {
-    asset_name(name).is_ok()
-}
-
-/// The name, where it is one that a folder can have without meeting our own names.
-fn asset_name(name: &str) -> Result<&str, ExportError> {
-    let bad = name.is_empty()
-        || name.starts_with('.')
-        || name.contains(['/', '\\', '\0'])
-        || RESERVED.contains(&name);
-    if bad {
-        return Err(ExportError::AssetName { name: name.into() });
-    }
-    Ok(name)
 }
 
 /// Replacing deletes what was there, so it must be nothing, an empty folder, or an earlier one of the same kind.

@@ -1,6 +1,6 @@
 //! Names of unfinished folders, putting finished ones in place, and clearing up after dead runs.
 
-use super::asset_name;
+use crate::export::names::asset_name;
 use std::fs;
 use std::io;
 use std::path::Path;

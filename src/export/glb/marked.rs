@@ -4,7 +4,7 @@
 //! for each mark that occurs, the marked ones first; how many faces have which mark in `meshes[].extras`, under the key `affineAtlas`.
 //! *Not guaranteed:* double precision, as in `surface.glb`. Faces with a corner that is not finite are left out.
 
-use super::Builder;
+use super::builder::Builder;
 use crate::export::ExportError;
 use gltf::json::accessor::Type;
 use gltf::json::extras::RawValue;
@@ -176,7 +176,7 @@ fn primitive(
     material: Index<Material>,
 ) -> Primitive {
     let mut accessor = builder.attribute(position, Type::Vec3);
-    let (low, high) = super::bounds(position);
+    let (low, high) = super::builder::bounds(position);
     accessor.min = Some(Value::from(low.to_vec()));
     accessor.max = Some(Value::from(high.to_vec()));
     let accessor = builder.root.push(accessor);

@@ -1,6 +1,6 @@
 //! Materials, textures and images of `surface.glb`: those that the component uses, each once.
 
-use super::Builder;
+use super::builder::Builder;
 use super::vertices::Sets;
 use crate::geometry::ids::NONE;
 use crate::geometry::mesh::{Appearance, Material, TextureUse};

@@ -3,7 +3,7 @@
 //! *Guaranteed:* the vertices of a mesh are those it was rebuilt with, shared by all faces that meet there: as watertight
 //! as the mesh. *Not guaranteed:* double precision: positions are 32-bit floats, relative to the node's translation.
 
-use super::Builder;
+use super::builder::Builder;
 use crate::export::ExportError;
 use gltf::json::accessor::Type;
 use gltf::json::material::{PbrBaseColorFactor, PbrMetallicRoughness, StrengthFactor};
@@ -47,7 +47,7 @@ pub fn encode(components: &[Component<'_>]) -> Result<Vec<u8>, ExportError> {
             .map(|p| std::array::from_fn(|i| (p[i] - f64::from(origin[i])) as f32))
             .collect();
         let mut accessor = builder.attribute(&position, Type::Vec3);
-        let (low, high) = super::bounds(&position);
+        let (low, high) = super::builder::bounds(&position);
         accessor.min = Some(Value::from(low.to_vec()));
         accessor.max = Some(Value::from(high.to_vec()));
         let accessor = builder.root.push(accessor);

@@ -5,7 +5,7 @@
 //! of the inequality in `meshes[].extras`, under the key `affineAtlas`.
 //! *Not guaranteed:* double precision, as in `surface.glb`.
 
-use super::Builder;
+use super::builder::Builder;
 use crate::export::ExportError;
 use crate::flow::feasibility::{Side, Violation};
 use crate::geometry::ids::{FaceId, VertexVec};
@@ -156,7 +156,7 @@ fn primitive(
         }
     }
     let mut accessor = builder.attribute(&position, Type::Vec3);
-    let (low, high) = super::bounds(&position);
+    let (low, high) = super::builder::bounds(&position);
     accessor.min = Some(Value::from(low.to_vec()));
     accessor.max = Some(Value::from(high.to_vec()));
     let accessor = builder.root.push(accessor);

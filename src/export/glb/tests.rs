@@ -1,8 +1,12 @@
 //! Files are read back by the `gltf` crate, which shares no code with the writer's layout of bytes.
 
+use super::builder::bounds;
 use super::*;
 use crate::export::{atlas_json, sample};
 use crate::geometry::mesh::{Appearance, AttributeKind, CornerAttribute, Material, TextureUse};
+use gltf::json::Value;
+use gltf::json::accessor::ComponentType;
+use gltf::json::validation::Checked;
 use std::collections::BTreeSet;
 
 struct Read {

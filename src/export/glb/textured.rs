@@ -3,7 +3,7 @@
 //! *Guaranteed:* triangles stand in the order of the faces; a vertex of the surface is there once for each place that it has in the
 //! texture. *Not guaranteed:* double precision: positions are 32-bit floats, relative to the node's translation.
 
-use super::Builder;
+use super::builder::Builder;
 use super::vertices::{PACKED_TOLERANCE, normals, unit};
 use crate::export::ExportError;
 use crate::geometry::ids::NONE;
@@ -44,7 +44,7 @@ pub fn encode(textured: &Textured<'_>) -> Result<Vec<u8>, ExportError> {
     let mut builder = Builder::default();
     let corners = Corners::split(textured)?;
     let mut position = builder.attribute(&corners.position, Type::Vec3);
-    let (low, high) = super::bounds(&corners.position);
+    let (low, high) = super::builder::bounds(&corners.position);
     position.min = Some(Value::from(low.to_vec()));
     position.max = Some(Value::from(high.to_vec()));
     let normal = builder.attribute(&corners.normal, Type::Vec3);

@@ -1,6 +1,6 @@
 //! What is different from the run before.
 
-use super::figures::Asset;
+use super::assets::Asset;
 use super::history::Past;
 use crate::export::manifest::State;
 use std::collections::BTreeMap;

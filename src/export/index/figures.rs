@@ -1,21 +1,10 @@
-//! The figures of every asset, from the `atlas.json` of its components.
+//! The figures of an asset, from the `atlas.json` of its components.
 
-use super::history::Past;
-use crate::export::manifest::{Manifest, Record, State};
-use rayon::prelude::*;
+use crate::export::manifest::Record;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-
-/// An asset of the run.
-pub(super) struct Asset<'a> {
-    /// What the manifest says.
-    pub record: &'a Record,
-    /// Its atlases, those of an earlier run after a failure.
-    pub figures: Option<Figures>,
-}
 
 /// Figures of all components together: counts are added up, of the others the worst is taken.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -73,29 +62,8 @@ struct Mean {
     mean: f64,
 }
 
-/// All assets of a manifest, by id. Those kept from the run before are not read again.
-pub(super) fn collect<'a>(
-    output_root: &Path,
-    manifest: &'a Manifest,
-    before: &BTreeMap<String, Past>,
-) -> Vec<Asset<'a>> {
-    let records: Vec<&Record> = manifest.records().collect();
-    let assets = records.into_par_iter().map(|record| {
-        let known = before.get(&record.id).filter(|past| {
-            record.state == State::Cached
-                && matches!(past.state, State::Built | State::Cached)
-                && past.input_hash == record.input_hash
-                && past.config_hash == record.config_hash
-        });
-        let figures = known
-            .and_then(|past| past.figures.clone())
-            .or_else(|| read(output_root, record));
-        Asset { record, figures }
-    });
-    assets.collect()
-}
-
-fn read(output_root: &Path, record: &Record) -> Option<Figures> {
+/// Those of the asset's atlases; nothing where there are none, or none can be read.
+pub(super) fn read(output_root: &Path, record: &Record) -> Option<Figures> {
     let documents = record
         .files
         .iter()

@@ -1,6 +1,6 @@
 //! What a run leaves for the next one to compare with: one line of JSON an asset.
 
-use super::figures::{Asset, Figures};
+use super::figures::Figures;
 use crate::export::manifest::State;
 use crate::export::{Action, ExportError};
 use serde::{Deserialize, Serialize};
@@ -36,16 +36,9 @@ pub(super) fn load(path: &Path) -> Result<BTreeMap<String, Past>, ExportError> {
 }
 
 /// The text of the file.
-pub(super) fn to_text(assets: &[Asset<'_>]) -> String {
+pub(super) fn to_text(assets: impl Iterator<Item = Past>) -> String {
     let mut text = String::new();
-    for asset in assets {
-        let past = Past {
-            id: asset.record.id.clone(),
-            state: asset.record.state,
-            input_hash: asset.record.input_hash.clone(),
-            config_hash: asset.record.config_hash.clone(),
-            figures: asset.figures.clone(),
-        };
+    for past in assets {
         let line = serde_json::to_string(&past)
             .expect("string keys and no custom serialiser, so that serialisation cannot fail");
         text.push_str(&line);

@@ -7,6 +7,7 @@
 //! are text, whatever they hold. Like the manifest it holds times.
 //! *Not guaranteed:* that anything is said of an asset whose `atlas.json` cannot be read beyond what the manifest says.
 
+mod assets;
 mod changes;
 mod figures;
 mod history;
@@ -15,12 +16,14 @@ mod page;
 use crate::export::ExportError;
 use crate::export::folder::write_file_atomically;
 use crate::export::manifest::Manifest;
+use crate::export::names;
+use assets::Asset;
 use std::path::Path;
 
 /// Name of the page in the output root.
-pub const FILE_NAME: &str = "index.html";
+pub const FILE_NAME: &str = names::INDEX;
 /// Name of what the next run compares with.
-pub const HISTORY_NAME: &str = "history.jsonl";
+pub const HISTORY_NAME: &str = names::HISTORY;
 
 /// Writes the page of a run that has ended and whose manifest is `current`.
 ///
@@ -36,11 +39,11 @@ pub fn write_against(
     history: &Path,
 ) -> Result<(), ExportError> {
     let before = history::load(history)?;
-    let assets = figures::collect(output_root, current, &before);
+    let assets = assets::collect(output_root, current, &before);
     let changes = changes::compare(&before, &assets);
     let text = page::page(&assets, &changes);
     write_file_atomically(&output_root.join(FILE_NAME), text.as_bytes())?;
-    let lines = history::to_text(&assets);
+    let lines = history::to_text(assets.iter().map(Asset::past));
     write_file_atomically(&output_root.join(HISTORY_NAME), lines.as_bytes())
 }
 

@@ -1,11 +1,10 @@
 //! The page itself.
 
+use super::assets::Asset;
 use super::changes::{Change, Changes, WORSE_BY, WORSE_FACTOR};
-use super::figures::Asset;
-use crate::export::folder::component_name;
 use crate::export::html::{self, escape, figure, link};
 use crate::export::manifest::State;
-use crate::export::report;
+use crate::export::names::{self, component_name};
 use std::fmt::Write as _;
 
 const STYLE: &str = include_str!("index.css");
@@ -93,7 +92,7 @@ fn linked(asset: &Asset<'_>) -> String {
         return escape(id);
     }
     let mut out = format!("<a href=\"{}\">{}</a>", link(&format!("{id}/")), escape(id));
-    let ending = format!("/{}", report::FILE_NAME);
+    let ending = format!("/{}", names::REPORT);
     let reports: Vec<&String> = (asset.record.files.iter())
         .filter(|file| file.ends_with(&ending))
         .collect();

@@ -15,7 +15,7 @@ const GOAL: [u8; 3] = [200, 96, 40];
 /// log₁₀ of max |K − K̄| against flow time with axes, and the bound that the flow had to reach as a dashed line;
 /// `size` × ⌊5/8 `size`⌋ pixels. The gradient flow is a straight line here, Newton a curve that falls ever faster.
 pub fn convergence(atlas: &AffineAtlas, size: usize) -> RgbImage {
-    let size = super::side(size);
+    let size = super::size::side(size);
     let (width, height) = (size, (5 * size / 8).max(1));
     let points: Vec<[f64; 2]> = (atlas.metric.history.iter())
         .map(|step| [step.flow_time, step.max_error.max(FLOOR).log10()])

@@ -54,7 +54,7 @@ impl<'a> Gallery<'a> {
             studios.push(studio([-x, if above { -y } else { y }, -z]));
         }
         Gallery {
-            side: super::side(size),
+            side: super::size::side(size),
             studios,
             mesh,
         }

@@ -43,7 +43,7 @@ impl Frame {
 /// The central chart with its patches in different colours, darker where it overlaps itself, with the cut (orange), the
 /// surface's boundary (dark) and the cones; to the right the packed square. 2 `size` × `size` pixels.
 pub fn layout(atlas: &AffineAtlas, size: usize) -> RgbImage {
-    let size = super::side(size);
+    let size = super::size::side(size);
     let (full, titled) = (size as f64, size >= 240);
     let margin = 0.04 * full;
     let head = if titled { 30.0 } else { margin };

@@ -32,6 +32,7 @@ mod paint;
 mod raster;
 pub(crate) mod scale;
 mod scene;
+mod size;
 mod studio;
 mod surface;
 mod text;
@@ -40,20 +41,13 @@ mod view;
 pub use convergence::convergence;
 pub use gallery::{Gallery, Panel};
 pub use layout::layout;
+pub use size::SIDE_RANGE;
 pub use surface::{log_scale, painted, preview};
 
 use crate::export::ExportError;
 use crate::export::folder::Staging;
 use crate::product::AffineAtlas;
 use image::{ImageBuffer, ImageEncoder, PixelWithColorType};
-
-/// Sides that pictures are held to, pixels: smaller ones show nothing, larger ones are a mistake.
-pub const SIDE_RANGE: [usize; 2] = [64, 8192];
-
-/// The size asked for, held to [`SIDE_RANGE`].
-fn side(size: usize) -> usize {
-    size.clamp(SIDE_RANGE[0], SIDE_RANGE[1])
-}
 
 /// Draws all pictures of an atlas into a staging folder; `subfolder` as for
 /// [`write_component`](crate::export::write_component).

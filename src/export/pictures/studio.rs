@@ -70,7 +70,7 @@ impl<'a> Studio<'a> {
 
     /// The same from a direction, a unit vector from the scene to the eye.
     pub fn seen_from(mesh: &'a Mesh, size: usize, direction: Vec3) -> Studio<'a> {
-        let size = super::side(size);
+        let size = super::size::side(size);
         let connectivity = &mesh.connectivity;
         let positions = mesh.positions.as_slice();
         let faces = connectivity.to_faces();

@@ -8,11 +8,12 @@ use crate::atlas::geometry_image::ImageParams;
 use crate::atlas::patches::{Patch, PatchLayout};
 use crate::atlas::plane::{Similarity, distance};
 use crate::flow::cones::{BoundaryCondition, Cone, Prescription};
+use crate::flow::refine::ConnectivityRepair;
 use crate::flow::ricci::{FlatMetric, FlowParams, FlowStep};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, NONE, PatchId, VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
-use crate::product::{AffineAtlas, ConnectivityRepair, Quality};
+use crate::product::{AffineAtlas, Quality};
 use image::RgbImage;
 use std::f64::consts::TAU;
 

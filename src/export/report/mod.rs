@@ -16,6 +16,7 @@ mod tables;
 use crate::export::atlas_json::{self, Document};
 use crate::export::folder::Staging;
 use crate::export::html::{self, escape, figure, link};
+use crate::export::names;
 use crate::export::{ExportError, Provenance};
 use crate::flow::ricci::Solver;
 use crate::product::AffineAtlas;
@@ -27,7 +28,7 @@ use std::io;
 use surface::{Drawing, RISING, Scales};
 
 /// Name of the file in the folder of a component.
-pub const FILE_NAME: &str = "report.html";
+pub const FILE_NAME: &str = names::REPORT;
 
 const STYLE: &str = include_str!("report.css");
 const SURFACE: &str = include_str!("surface.js");

@@ -1,7 +1,7 @@
 //! Plots of the page: the course of the flow and histograms of distortion, drawn as SVG with every value in words.
 
 use crate::export::html::figure;
-use crate::flow::ricci::FlowStep;
+use crate::flow::step::FlowStep;
 use crate::report::FaceDistortion;
 use std::fmt::Write as _;
 

@@ -5,11 +5,12 @@
 //! Nothing need be counted by hand, and a total that is meant to leave nothing leaves exactly nothing. On a component of which no
 //! vertex is listed all share alike.
 
+use super::error::ConeError;
+use super::params::BoundaryParams;
+use super::request::{RequestedCone, Requests};
 use super::spread::by_position;
-use super::{
-    BoundaryCondition, BoundaryParams, ConeError, GAUSS_BONNET_TOLERANCE, PiMultiple,
-    RequestedCone, Requests,
-};
+use crate::flow::pi_multiple::PiMultiple;
+use crate::flow::prescription::{BoundaryCondition, GAUSS_BONNET_TOLERANCE};
 use crate::geometry::connectivity::Topology;
 use crate::geometry::ids::{HalfedgeId, VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, distance};

@@ -1,6 +1,6 @@
 //! Why a prescription is refused. Vertices are those of the input file, angles are radians.
 
-use super::pi_multiple::in_pi;
+use crate::flow::pi_multiple::in_pi;
 
 /// Why there is no target curvature; vertices are those of the input file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -319,6 +319,15 @@ pub enum ConeError {
         /// Boundary vertices.
         given: usize,
     },
+}
+
+impl ConeError {
+    /// The automatic choice failed, for this reason.
+    pub(super) fn not_chosen(reason: impl ToString) -> Self {
+        Self::NotChosen {
+            reason: reason.to_string(),
+        }
+    }
 }
 
 fn twice(first: u32, second: u32, vertex: u32) -> String {

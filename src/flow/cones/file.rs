@@ -7,7 +7,8 @@
 //! *Guaranteed:* no vertex twice, all numbers finite; [`write()`] and [`parse`] are inverse to each other.
 //! *Not guaranteed:* that the mesh has such vertices, nor Gauss–Bonnet: both are checked where the mesh is known.
 
-use super::{ConeSpec, PiMultiple};
+use super::params::ConeSpec;
+use crate::flow::pi_multiple::PiMultiple;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::ops::Range;

@@ -1,8 +1,9 @@
 //! Which component, and which of its vertices, the user means.
 
-use super::{
-    BoundaryCondition, BoundaryParams, ConeError, ConeParams, ConeSpec, ConeStrategy, spread,
-};
+use super::error::ConeError;
+use super::params::{BoundaryParams, ConeParams, ConeSpec, ConeStrategy};
+use super::spread;
+use crate::flow::prescription::BoundaryCondition;
 use crate::geometry::ids::{NONE, VertexId};
 use crate::geometry::mesh::{Mesh, distance};
 use crate::repair::Repaired;

@@ -1,19 +1,10 @@
-//! Both sides of (6) for one vertex set, and the sets that break it.
+//! Both sides of (6) for one vertex set.
 
 use super::exact::{ConeAngle, Exact};
-use super::{Violation, transport};
-use crate::flow::cones::BoundaryCondition;
+use super::violation::{Side, Violation};
+use crate::flow::prescription::BoundaryCondition;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, HalfedgeId, VertexId, VertexVec};
-
-/// Which side of the constraint is broken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
-    /// Too little curvature: the cone angles do not fit into the faces around.
-    Below,
-    /// Too much curvature: the faces around have no room for so small cone angles.
-    Above,
-}
 
 /// Vertices, connected by faces, that break (6).
 #[derive(Clone, Debug, PartialEq)]
@@ -165,20 +156,6 @@ impl<'a> Constraint<'a> {
         [most - wanted, wanted - least]
     }
 
-    /// The set as a region, where it breaks (6).
-    fn region(&mut self, vertices: Vec<VertexId>, side: Side) -> Option<Region> {
-        let [upper, lower] = self.exact_slacks(&vertices);
-        let slack = match side {
-            Side::Below => upper,
-            Side::Above => lower,
-        };
-        (slack <= 0).then(|| Region {
-            vertices,
-            side,
-            slack: self.exact.radians(slack),
-        })
-    }
-
     /// The prescribed vertex with the least room left alone, on either side, and that room without the margin's factor, radians: no
     /// region can be sure of more. `None` where no single vertex is a proper set.
     pub fn tightest_vertex(&mut self) -> Option<(VertexId, f64)> {
@@ -195,55 +172,6 @@ impl<'a> Constraint<'a> {
             }
         }
         tightest.map(|(slack, v)| (v, self.exact.radians(slack) / self.margin))
-    }
-
-    /// The connected regions that break (6) together; none exactly where (6) holds.
-    ///
-    /// They are those of the *least* set with the least slack; where the least slack is zero, of one set that has it.
-    pub fn offending_regions(&mut self) -> Vec<Region> {
-        for set in transport::candidates(self) {
-            let regions = self.connected_regions(&set);
-            if !regions.is_empty() {
-                return regions;
-            }
-        }
-        Vec::new()
-    }
-
-    /// Splits a set into regions, or its complement where that is smaller or the set holds a free boundary.
-    fn connected_regions(&mut self, set: &VertexVec<bool>) -> Vec<Region> {
-        let c = self.connectivity;
-        let holds_free = (c.vertices()).any(|v| set[v] && !self.is_prescribed(v));
-        let leaves_free = (c.vertices()).any(|v| !set[v] && !self.is_prescribed(v));
-        let size = set.iter().filter(|&&x| x).count();
-        let complement = holds_free || (!leaves_free && 2 * size > set.len());
-        let side = match complement {
-            true => Side::Above,
-            false => Side::Below,
-        };
-        let mut waiting: VertexVec<bool> = set.iter().map(|&x| x != complement).collect();
-        let mut regions = Vec::new();
-        for start in c.vertices() {
-            if !std::mem::take(&mut waiting[start]) {
-                continue;
-            }
-            let mut vertices = vec![start];
-            let mut next = 0;
-            while let Some(&v) = vertices.get(next) {
-                next += 1;
-                // Vertices that share a face share an edge.
-                for w in c.neighbours(v) {
-                    if std::mem::take(&mut waiting[w]) {
-                        vertices.push(w);
-                    }
-                }
-            }
-            vertices.sort_unstable();
-            if vertices.len() < c.vertex_count() {
-                regions.extend(self.region(vertices, side));
-            }
-        }
-        regions
     }
 
     /// What to say about a region: both sides of (6), without the margin's factor.

@@ -23,7 +23,7 @@
 //! take it beyond 2²⁴ go to case 2), k makes L 2ᵏ lie in (2⁶², 2⁶³], and a/b = ρ is the margin, b ≤ 100. Angles count up to
 //! 2²⁰π. So one angle is below 2⁹² units, a sum over 2³² corners below 2¹²⁴, and nothing overflows an `i128`.
 
-use crate::flow::ricci::GAUSS_BONNET_TOLERANCE;
+use crate::flow::prescription::GAUSS_BONNET_TOLERANCE;
 use crate::geometry::ids::{EdgeVec, VertexVec};
 use std::collections::BTreeSet;
 use std::f64::consts::PI;

@@ -2,11 +2,11 @@ mod brute;
 mod gluing;
 
 use super::*;
-use crate::flow::cones::{BoundaryCondition, Prescription};
 use crate::flow::metric::{Evaluation, Metric};
+use crate::flow::prescription::{BoundaryCondition, Prescription};
 use crate::flow::ricci::shapes::{self, Shape};
 use crate::flow::schemes::{ConformalStructure, Law};
-use crate::geometry::ids::{EdgeId, EdgeVec, VertexVec};
+use crate::geometry::ids::{EdgeId, EdgeVec, VertexId, VertexVec};
 use std::f64::consts::PI;
 
 fn octahedron() -> Shape {

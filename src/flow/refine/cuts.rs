@@ -4,7 +4,7 @@
 //! gives it one edge more, and what that edge is worth, π − Φ of its halves, is taken to be what the whole was worth:
 //! exact for Φ ≡ 0, a guess otherwise, since Φ follows from the new lengths.
 
-use super::{Editor, OutOfSplits};
+use super::editor::{Editor, OutOfSplits};
 use crate::flow::feasibility::{Constraint, Region};
 use crate::geometry::ids::{EdgeVec, HalfedgeId, VertexVec};
 

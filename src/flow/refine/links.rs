@@ -1,9 +1,13 @@
 //! Enough edges around every disk of rings about a cone: criterion 1 of [`super`].
 
-use super::{Editor, MARGIN, OutOfSplits};
-use crate::flow::cones::BoundaryCondition;
+use super::editor::{Editor, OutOfSplits};
+use crate::flow::prescription::BoundaryCondition;
 use crate::geometry::ids::{FaceVec, HalfedgeId, VertexId, VertexVec};
 use std::f64::consts::{PI, TAU};
+
+/// How many times the edges that (6) demands shall be there beyond the first rings: with hardly more than (6) demands,
+/// the circles of one face differ in size by more than float64 can hold.
+const MARGIN: f64 = 1.5;
 
 const UNREACHED: u32 = u32::MAX;
 

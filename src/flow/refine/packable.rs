@@ -19,15 +19,16 @@
 //! prescription returned, so the flow that follows has a minimum to find.
 
 use super::cuts::{self, fill};
-use super::{Editor, OutOfSplits, RefineError, in_source};
-use crate::flow::cones::{BoundaryCondition, Prescription};
+use super::editor::{ConnectivityRepair, Editor, OutOfSplits};
+use super::params::RefineError;
+use super::source::in_source;
 use crate::flow::feasibility::{self, Constraint};
 use crate::flow::metric::full_angles;
 use crate::flow::packing::{self, PackingError};
-use crate::flow::ricci::Scheme;
+use crate::flow::prescription::{BoundaryCondition, Prescription};
+use crate::flow::schemes::Scheme;
 use crate::geometry::ids::{EdgeVec, VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
-use crate::product::ConnectivityRepair;
 use std::f64::consts::PI;
 
 /// How many times the room that (6) demands shall be there; see [`feasibility`](crate::flow::feasibility). Little, since it is asked

@@ -1,6 +1,7 @@
 //! Valence of the vertices in the first rings around cones: criterion 2 of [`super`].
 
-use super::{Editor, OutOfSplits, RefineParams};
+use super::editor::{Editor, OutOfSplits};
+use super::params::RefineParams;
 use crate::geometry::ids::{FaceId, HalfedgeId, VertexId, VertexVec};
 use std::cmp::Ordering;
 use std::collections::VecDeque;

@@ -4,8 +4,9 @@ use crate::flow::cones::{
 };
 use crate::flow::feasibility::{self, Constraint};
 use crate::flow::packing;
-use crate::flow::ricci::Scheme;
-use crate::geometry::ids::NONE;
+use crate::flow::prescription::BoundaryCondition;
+use crate::flow::ricci::{FlowParams, Scheme};
+use crate::geometry::ids::{EdgeId, FaceId, NONE, VertexVec};
 use crate::geometry::mesh::{Soup, triangle_area};
 use crate::repair::assemble::doubled_edges;
 use crate::repair::corpus::{self, soup};

@@ -1,8 +1,8 @@
 //! Why the flow ends without a metric: every variant names what in the input is at fault, and what to change.
 
-use super::Scheme;
 use crate::flow::feasibility::Violation;
 use crate::flow::packing::PackingError;
+use crate::flow::schemes::Scheme;
 use crate::flow::solve::SolveError;
 use crate::geometry::connectivity::ConnectivityError;
 use crate::geometry::ids::{EdgeId, FaceId, VertexId};

@@ -143,7 +143,7 @@ fn newton_alone(shape: &Shape, prescription: &Prescription) -> Result<(Solution,
         params: &params,
         observer: &(),
     };
-    let solution = problem.minimise()?;
+    let solution = minimise(&mut problem)?;
     let error = problem.max_error(&solution.evaluation);
     Ok((solution, error))
 }
@@ -284,7 +284,7 @@ fn newton_converges_on_larger_surfaces_exactly_where_packings_exist() {
             Ok((solution, error)) => {
                 assert!(exists, "round {round}, slack {:e}π", step / PI);
                 assert!(error <= 1e-10);
-                widest = widest.max(newton::spread(&solution.u));
+                widest = widest.max(crate::flow::scale::spread(&solution.u));
             }
             Err(error) => assert!(!exists, "round {round}, slack {:e}π: {error}", step / PI),
         }

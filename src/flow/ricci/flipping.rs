@@ -7,12 +7,17 @@
 //!
 //! A surface with boundary is doubled. A boundary vertex of curvature K̄ becomes an interior one of 2K̄; a free boundary keeps u = 0 there.
 
-use super::{FlatMetric, FlowError, FlowParams, Problem, Solution, shift};
+use super::error::FlowError;
+use super::flat_metric::FlatMetric;
+use super::minimise::minimise;
+use super::params::FlowParams;
+use super::problem::{Problem, Solution};
 use crate::flow::correspondence::Correspondence;
 use crate::flow::delaunay::Delaunay;
 use crate::flow::doubled::Doubled;
 use crate::flow::intrinsic::Intrinsic;
 use crate::flow::metric::{self, Metric};
+use crate::flow::scale::shift;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, VertexVec};
 use crate::observe::Observer;
@@ -63,7 +68,7 @@ pub(super) fn flow(
         mut u,
         evaluation,
         mut history,
-    } = problem.minimise()?;
+    } = minimise(&mut problem)?;
     // A trial that was rejected last may have flipped edges too, and no line has counted them.
     let counted: usize = history.iter().map(|step| step.flips).sum();
     if let Some(last) = history.last_mut() {

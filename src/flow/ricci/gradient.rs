@@ -14,8 +14,11 @@
 //! is large on large meshes. With λ₁ measured from the decay, the flow goes on until the remaining way in u is
 //! below `REMAINING_CHANGE`, or until rounding stops the decay.
 
-use super::{FlowError, FlowStep, Problem, Solution, dot, shift};
+use super::error::FlowError;
+use super::problem::{Problem, Solution};
 use crate::flow::metric::Evaluation;
+use crate::flow::scale::{dot, shift};
+use crate::flow::step::FlowStep;
 use crate::geometry::ids::VertexVec;
 
 /// ε relative to the largest stable one.

@@ -16,277 +16,36 @@
 pub mod error;
 #[cfg(test)]
 mod existence;
+mod flat_metric;
 mod flipping;
 pub mod gradient;
+mod minimise;
 pub mod newton;
 mod params;
+mod problem;
 #[cfg(test)]
 pub(crate) mod shapes;
-pub(crate) mod system;
 #[cfg(test)]
 mod tests;
 
+pub use crate::flow::packing::PackingFit;
+pub use crate::flow::schemes::Scheme;
+pub use crate::flow::step::FlowStep;
 pub use error::{FlowError, Method};
-pub use params::{FlowParams, Scheme, Solver};
+pub use flat_metric::FlatMetric;
+pub use params::{FlowParams, Solver};
 
-use crate::flow::cones::{BoundaryCondition, Prescription};
 use crate::flow::feasibility::{self, Constraint};
-use crate::flow::intrinsic::Intrinsic;
-use crate::flow::metric::{self, Evaluation, Metric, full_angles};
+use crate::flow::metric::{self, Metric, full_angles};
+use crate::flow::prescription::{BoundaryCondition, GAUSS_BONNET_TOLERANCE, Prescription};
+use crate::flow::scale::shift;
 use crate::flow::schemes::{ConformalStructure, Law};
 use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{EdgeVec, FaceId, VertexId, VertexVec};
+use crate::geometry::ids::{EdgeVec, VertexVec};
 use crate::observe::Observer;
+use minimise::minimise;
+use problem::{Problem, Solution};
 use std::f64::consts::PI;
-
-/// One line of the convergence record.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    serde::Serialize,
-    serde::Deserialize,
-    schemars::JsonSchema,
-)]
-pub struct FlowStep {
-    /// Number of the iteration, 0 for the state before the first.
-    pub iteration: usize,
-    /// max |K − K̄| over the vertices that are prescribed, radians.
-    pub max_error: f64,
-    /// Convex energy, relative to the start.
-    pub energy: f64,
-    /// Step length taken to come here; 1 is a full Newton step.
-    pub step: f64,
-    /// Edges flipped to come here. In the first line those that make the triangulation of the surface itself Delaunay; the lines
-    /// together count every flip.
-    pub flips: usize,
-    /// Σε for the gradient flow, the iteration for Newton.
-    pub flow_time: f64,
-}
-
-/// How well a circle packing keeps the lengths in space (1).
-#[derive(
-    Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
-)]
-pub struct PackingFit {
-    /// Mean over the edges of |l − l̄| / l̄.
-    pub mean_length_error: f64,
-    /// Largest |l − l̄| / l̄.
-    pub max_length_error: f64,
-    /// Share of the edges whose Φ lies at an end of [0, π/2].
-    pub clamped: f64,
-}
-
-/// A flat metric with cones, and how it was reached.
-#[derive(Clone, Debug)]
-pub struct FlatMetric {
-    /// `u` for vertex scaling, `u − ln γ⁰` for packings, so that the lengths below follow from it and the scheme.
-    pub log_scale: VertexVec<f64>,
-    /// Flat length of every edge, source units: of the surface's own edges, or where there is `intrinsic`, of the edges
-    /// of `intrinsic.flat`.
-    pub length: EdgeVec<f64>,
-    /// The triangulations that the flow with flips went through; `None` where the connectivity stayed.
-    pub intrinsic: Option<Box<Intrinsic>>,
-    /// Curvature reached at every vertex, radians; also where the boundary is free.
-    pub curvature: VertexVec<f64>,
-    /// One entry an iteration.
-    pub history: Vec<FlowStep>,
-    /// max |K − K̄| over the prescribed vertices, radians.
-    pub max_curvature_error: f64,
-    /// Fit of the packing, for circle packings that have one.
-    pub fit: Option<PackingFit>,
-}
-
-/// Bound on the difference between the total of K̄ and 2πχ, radians.
-pub const GAUSS_BONNET_TOLERANCE: f64 = 1e-9;
-/// Most broken faces that an error lists.
-const LISTED_FACES: usize = 8;
-
-/// One flow to solve: what both solvers share.
-pub(crate) struct Problem<'a> {
-    metric: Metric<'a>,
-    /// K̄; with the rounding of Gauss–Bonnet spread over all vertices where everything is prescribed.
-    target: VertexVec<f64>,
-    /// False where `u` stays (free boundary).
-    prescribed: VertexVec<bool>,
-    /// Vertex with whose `u` that of a vertex moves: itself, or its mirror image in a double.
-    shares: VertexVec<VertexId>,
-    /// True where adding a constant to `u` changes nothing.
-    scale_free: bool,
-    params: &'a FlowParams,
-    observer: &'a dyn Observer,
-}
-
-/// Where a solver ended.
-pub(crate) struct Solution {
-    u: VertexVec<f64>,
-    evaluation: Evaluation,
-    history: Vec<FlowStep>,
-}
-
-impl Problem<'_> {
-    fn unknowns(&self) -> system::Unknowns<'_> {
-        system::Unknowns {
-            connectivity: self.metric.connectivity(),
-            prescribed: &self.prescribed,
-            shares: &self.shares,
-            scale_free: self.scale_free,
-            flips: self.metric.flips(),
-        }
-    }
-
-    /// Gradient of the energy, K − K̄, radians; 0 where `u` stays.
-    fn residual(&self, evaluation: &Evaluation) -> VertexVec<f64> {
-        let mut residual: VertexVec<f64> = evaluation
-            .curvature
-            .enumerate()
-            .map(|(v, &k)| {
-                if self.prescribed[v] {
-                    k - self.target[v]
-                } else {
-                    0.0
-                }
-            })
-            .collect();
-        if self.scale_free {
-            // Exactly 0 in theory; what rounding leaves must not gather at one vertex.
-            let mean = residual.iter().sum::<f64>() / residual.len().max(1) as f64;
-            residual.as_mut_slice().iter_mut().for_each(|r| *r -= mean);
-        }
-        residual
-    }
-
-    /// max |K − K̄| over the prescribed vertices, radians; infinite where some angle is no number.
-    fn max_error(&self, evaluation: &Evaluation) -> f64 {
-        let mut largest: f64 = 0.0;
-        for (v, &k) in evaluation.curvature.enumerate() {
-            if self.prescribed[v] {
-                let error = (k - self.target[v]).abs();
-                largest = if error.is_nan() {
-                    f64::INFINITY
-                } else {
-                    largest.max(error)
-                };
-            }
-        }
-        largest
-    }
-
-    /// Change of energy along a straight step of `u`: ∫₀¹ Σ (K − K̄)(u + t s δ) s δ dt, by five Gauss–Legendre points on each
-    /// piece that moves `u` by at most 1. `scratch` is overwritten.
-    fn energy_change(
-        &mut self,
-        u: &VertexVec<f64>,
-        direction: &VertexVec<f64>,
-        step: f64,
-        scratch: &mut Evaluation,
-    ) -> f64 {
-        let (near, far) = ((10.0_f64 / 7.0).sqrt(), 70.0_f64.sqrt());
-        let inner = (5.0 - 2.0 * near).sqrt() / 6.0;
-        let outer = (5.0 + 2.0 * near).sqrt() / 6.0;
-        let points = [
-            (0.5 - outer, (322.0 - 13.0 * far) / 1800.0),
-            (0.5 - inner, (322.0 + 13.0 * far) / 1800.0),
-            (0.5, 64.0 / 225.0),
-            (0.5 + inner, (322.0 + 13.0 * far) / 1800.0),
-            (0.5 + outer, (322.0 - 13.0 * far) / 1800.0),
-        ];
-        let largest = direction.iter().map(|d| d.abs()).fold(0.0, f64::max);
-        let pieces = (step.abs() * largest).ceil().clamp(1.0, 32.0);
-        let mut change = 0.0;
-        for piece in 0..pieces as usize {
-            for (t, weight) in points {
-                let at = step * (piece as f64 + t) / pieces;
-                self.metric.evaluate(&moved(u, direction, at), scratch);
-                change += weight * step / pieces * dot(&self.residual(scratch), direction);
-            }
-        }
-        change
-    }
-
-    /// Lets mirror images have a `u` of their own; false where all have already.
-    fn separate(&mut self) -> bool {
-        let vertices = self.metric.connectivity().vertices();
-        let own = vertices.collect();
-        std::mem::replace(&mut self.shares, own) != self.shares
-    }
-
-    fn minimise(&mut self) -> Result<Solution, FlowError> {
-        match self.params.solver {
-            Solver::Newton => newton::minimise(self),
-            Solver::Gradient => gradient::minimise(self),
-        }
-    }
-
-    fn not_converged(&self, iterations: usize, evaluation: &Evaluation) -> FlowError {
-        self.failure(
-            iterations,
-            self.max_error(evaluation),
-            &evaluation.broken_faces(),
-        )
-    }
-
-    /// With flips a solution exists always: then its scales are beyond float64.
-    fn out_of_range(&self, iterations: usize, range: f64, evaluation: &Evaluation) -> FlowError {
-        match self.metric.may_flip() {
-            true => FlowError::ScaleRange { iterations, range },
-            false => self.not_converged(iterations, evaluation),
-        }
-    }
-
-    /// The tolerance is met, but a further step would still change `u` by `change`.
-    fn runaway(&self, iterations: usize, u: &VertexVec<f64>, change: f64) -> FlowError {
-        FlowError::Runaway {
-            method: self.method(None),
-            iterations,
-            range: newton::spread(u),
-            change,
-        }
-    }
-
-    fn failure(&self, iterations: usize, max_error: f64, broken: &[FaceId]) -> FlowError {
-        let (most, key) = match self.params.solver {
-            Solver::Newton => (self.params.max_newton_steps, "flow.max_newton_steps"),
-            Solver::Gradient => (self.params.max_gradient_steps, "flow.max_gradient_steps"),
-        };
-        // Faces of a flipped triangulation are not those of the surface.
-        let listed = match self.metric.may_flip() {
-            true => 0,
-            false => LISTED_FACES,
-        };
-        FlowError::NotConverged {
-            method: self.method((iterations >= most).then_some(key)),
-            iterations,
-            max_error,
-            tolerance: self.params.curvature_tolerance,
-            broken: broken.len(),
-            faces: broken.iter().copied().take(listed).collect(),
-        }
-    }
-
-    fn method(&self, out_of_steps: Option<&'static str>) -> Method {
-        Method {
-            scheme: self.params.scheme,
-            flips: self.metric.may_flip(),
-            out_of_steps,
-        }
-    }
-}
-
-/// Dot product in the order of vertices.
-fn dot(a: &VertexVec<f64>, b: &VertexVec<f64>) -> f64 {
-    a.iter().zip(b.iter()).map(|(a, b)| a * b).sum()
-}
-
-pub(crate) fn moved(u: &VertexVec<f64>, direction: &VertexVec<f64>, step: f64) -> VertexVec<f64> {
-    u.iter()
-        .zip(direction.iter())
-        .map(|(u, d)| u + step * d)
-        .collect::<Vec<_>>()
-        .into()
-}
 
 /// Flows to the prescribed curvature; see the module docs.
 ///
@@ -348,7 +107,7 @@ pub fn flow(
         params,
         observer,
     };
-    let solution = problem.minimise()?;
+    let solution = minimise(&mut problem)?;
     finish(
         &problem,
         &structure,
@@ -462,8 +221,4 @@ fn finish(
         max_curvature_error,
         fit: structure.fit,
     })
-}
-
-fn shift(u: &mut VertexVec<f64>, constant: f64) {
-    u.as_mut_slice().iter_mut().for_each(|u| *u += constant);
 }

@@ -16,9 +16,12 @@
 //! After the tolerance is met, full steps are taken as long as each at least halves the error: they are cheap, and
 //! the layout profits from curvatures at the floor of float64.
 
-use super::system::System;
-use super::{FlowError, FlowStep, Problem, Solution, dot, moved};
+use super::error::FlowError;
+use super::problem::{Problem, Solution};
+use crate::flow::laplacian::System;
 use crate::flow::metric::Evaluation;
+use crate::flow::scale::{dot, moved, spread};
+use crate::flow::step::FlowStep;
 use crate::geometry::ids::VertexVec;
 
 /// Largest change of `u` tried in one step: e^20 in scale. Beyond it the quadratic model means nothing.
@@ -44,15 +47,6 @@ const REMAINING_CHANGE: f64 = 0.1;
 /// Shifts of the diagonal, relative to the largest row, tried in turn until a direction leads down. The first is the rule;
 /// the others are for Hessians that are only semidefinite, or nearly so (all faces of a vertex broken).
 const SHIFTS: [f64; 7] = [0.0, 1e-14, 1e-11, 1e-8, 1e-5, 1e-3, 1e-1];
-
-/// Largest minus smallest value.
-pub(super) fn spread(values: &VertexVec<f64>) -> f64 {
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for &x in values.iter() {
-        (low, high) = (low.min(x), high.max(x));
-    }
-    high - low
-}
 
 pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
     let params = problem.params;

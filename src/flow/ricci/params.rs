@@ -1,29 +1,6 @@
 //! What a user may choose about the flow, with the defaults.
 
-/// Which conformal structure turns `u` into lengths.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    serde::Serialize,
-    serde::Deserialize,
-    schemars::JsonSchema,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum Scheme {
-    /// l = γi + γj (Φ ≡ 0).
-    Tangential,
-    /// (2) with Φ from (1).
-    Thurston,
-    /// l² = γi² + γj² + 2Iγiγj with the initial lengths exact.
-    InversiveDistance,
-    /// l = e^{(ui + uj)/2} l⁰.
-    #[default]
-    VertexScaling,
-}
+use crate::flow::schemes::Scheme;
 
 /// How the minimum of the energy is found.
 #[derive(

@@ -2,6 +2,7 @@
 
 use super::shapes::{self, Shape};
 use super::*;
+use crate::flow::metric::Evaluation;
 use crate::geometry::ids::{EdgeId, FaceVec, VertexId};
 use crate::geometry::triangle;
 

@@ -10,7 +10,7 @@ mod distortion;
 mod failure;
 
 use super::flatten::{Flattened, flatten};
-use super::inspect::counted;
+use super::listing::counted;
 use super::{BuildError, Requests, cones, read, repair};
 use crate::config::Config;
 use crate::export::ExportError;

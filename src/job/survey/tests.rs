@@ -1,7 +1,7 @@
 //! Surveys of small surfaces made by hand.
 
 use super::*;
-use crate::flow::ricci::FlowStep;
+use crate::flow::step::FlowStep;
 use crate::job;
 use std::sync::atomic::{AtomicUsize, Ordering};
 

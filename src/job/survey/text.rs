@@ -2,7 +2,7 @@
 
 use super::{ComponentSurvey, Figures, Row, Survey};
 use crate::flow::cones::{ConeStrategy, in_pi};
-use crate::job::inspect::counted;
+use crate::job::listing::counted;
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 use std::fmt::{self, Write as _};

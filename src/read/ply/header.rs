@@ -1,6 +1,5 @@
 //! The header: which elements and properties follow, in which encoding.
 
-use super::body::Body;
 use crate::read::error::{Place, ReadProblem, shorten};
 use crate::read::text::Lines;
 
@@ -94,8 +93,18 @@ impl Element {
 /// Most lines of a header that declare something; real files have a few dozen.
 const MAX_DECLARATIONS: usize = 1024;
 
-/// The elements and what follows the header.
-pub fn read_header(bytes: &[u8]) -> Result<(Vec<Element>, Body<'_>), ReadProblem> {
+/// What the header says, and where it ends.
+pub struct Header {
+    pub elements: Vec<Element>,
+    pub encoding: Encoding,
+    /// First byte of the values.
+    pub end: usize,
+    /// Their first line.
+    pub line: usize,
+}
+
+/// Reads all up to `end_header`.
+pub fn read_header(bytes: &[u8]) -> Result<Header, ReadProblem> {
     let mut lines = Lines::new(bytes);
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
@@ -182,11 +191,10 @@ pub fn read_header(bytes: &[u8]) -> Result<(Vec<Element>, Body<'_>), ReadProblem
         expected: "a `format` line in the header",
         found: "end_header".into(),
     })?;
-    let body = Body {
-        bytes,
-        at: bytes.len() - lines.rest().len(),
-        line: lines.number + 1,
+    Ok(Header {
+        elements,
         encoding,
-    };
-    Ok((elements, body))
+        end: bytes.len() - lines.rest().len(),
+        line: lines.number + 1,
+    })
 }

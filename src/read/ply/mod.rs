@@ -18,7 +18,14 @@ use header::{Element, read_header};
 
 /// Reads a PLY file.
 pub(super) fn read_ply(bytes: &[u8], build: &mut SoupBuilder) -> Result<(), ReadProblem> {
-    let (elements, mut body) = read_header(bytes)?;
+    let header = read_header(bytes)?;
+    let mut body = Body {
+        bytes,
+        at: header.end,
+        line: header.line,
+        encoding: header.encoding,
+    };
+    let elements = header.elements;
     let vertices = elements.iter().find(|e| e.name == "vertex");
     let vertices = vertices.map_or(0, |e| e.count);
     build.expect_vertices(vertices)?;

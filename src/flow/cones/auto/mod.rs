@@ -29,10 +29,11 @@ mod quantum;
 mod search;
 mod tableau;
 
-use super::{
-    BoundaryCondition, BoundaryParams, ConeError, ConeParams, DEFAULT_COUNT, RequestedCone,
-    Requests, boundary, spread,
-};
+use super::error::ConeError;
+use super::params::{BoundaryParams, ConeParams, DEFAULT_COUNT};
+use super::request::{RequestedCone, Requests};
+use super::{boundary, spread};
+use crate::flow::prescription::BoundaryCondition;
 use crate::geometry::connectivity::Topology;
 use crate::geometry::ids::{VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
@@ -114,7 +115,7 @@ pub(super) fn select(
         return Ok(Vec::new());
     }
     let is_free = topology.boundary_loops > 0 && condition == BoundaryCondition::Free;
-    let picture = Picture::new(mesh, is_free).map_err(not_chosen)?;
+    let picture = Picture::new(mesh, is_free)?;
     let mut background: Vec<f64> = given.curvature;
     let own = background.iter_mut().zip(&picture.curvature);
     own.for_each(|(b, k)| *b -= k);
@@ -193,12 +194,6 @@ fn settle(placement: &mut Placement, found: Cones, rule: Rule) -> Cones {
     match placement.cost(&next) < now {
         true => moved,
         false => found,
-    }
-}
-
-fn not_chosen(reason: impl ToString) -> ConeError {
-    ConeError::NotChosen {
-        reason: reason.to_string(),
     }
 }
 

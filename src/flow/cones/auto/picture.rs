@@ -10,11 +10,11 @@
 //! A surface with boundary is doubled, as in the flow; a field has one value a vertex of the surface. Where the boundary is free,
 //! u = 0 there and curvature need not add up to anything.
 
+use crate::flow::cones::error::ConeError;
 use crate::flow::delaunay::Delaunay;
 use crate::flow::doubled::Doubled;
+use crate::flow::laplacian::{System, Unknowns};
 use crate::flow::metric::{Evaluation, Metric};
-use crate::flow::ricci::FlowError;
-use crate::flow::ricci::system::{System, Unknowns};
 use crate::geometry::ids::{NONE, VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, triangle_area};
 
@@ -41,10 +41,10 @@ pub(super) struct Picture {
 
 impl Picture {
     /// Flips to the Delaunay triangulation and factorises. `is_free`: u = 0 on the boundary.
-    pub(super) fn new(mesh: &Mesh, is_free: bool) -> Result<Self, FlowError> {
+    pub(super) fn new(mesh: &Mesh, is_free: bool) -> Result<Self, ConeError> {
         let surface = &mesh.connectivity;
         let length = surface.edges().map(|e| mesh.edge_length(e)).collect();
-        let doubled = Doubled::new(surface)?;
+        let doubled = Doubled::new(surface).map_err(ConeError::not_chosen)?;
         let copies = if surface.is_closed() { 1.0 } else { 2.0 };
         let base_length = doubled.on_both(surface, &length);
         let Doubled {
@@ -71,7 +71,7 @@ impl Picture {
             scale_free: false,
             flips: 0,
         };
-        let mut system = System::new(&unknowns, None)?;
+        let mut system = System::new(&unknowns, None).map_err(ConeError::not_chosen)?;
         let mut laplacian = system.assemble(connectivity, &weight);
         let area = vertex_areas(mesh);
         if !is_free {
@@ -82,9 +82,10 @@ impl Picture {
                 *diagonal *= 2.0;
             }
         }
-        system
+        let factorized = system
             .solver
-            .factorize(&laplacian.diagonal, &laplacian.off_diagonal)?;
+            .factorize(&laplacian.diagonal, &laplacian.off_diagonal);
+        factorized.map_err(ConeError::not_chosen)?;
         let half = |v| {
             if surface.is_boundary_vertex(v) {
                 0.5

@@ -11,7 +11,8 @@
 use super::candidates::{extremes, scattered};
 use super::placement::Placement;
 use super::pool::{LEAST_GAIN, Pool, Rule, Set};
-use crate::flow::cones::{DEFAULT_COUNT, spread};
+use crate::flow::cones::params::DEFAULT_COUNT;
+use crate::flow::cones::spread;
 use crate::geometry::ids::VertexId;
 use crate::geometry::mesh::triangle_area;
 

@@ -33,7 +33,7 @@ pub(crate) struct System {
     /// Edges between two unknowns.
     edge: Vec<EdgeId>,
     /// Number of flips at which the pattern was taken.
-    pub(super) flips: usize,
+    pub(crate) flips: usize,
     /// Number of flips at which the unknowns were ordered.
     ordered: usize,
 }

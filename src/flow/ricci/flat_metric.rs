@@ -1,0 +1,26 @@
+//! What the flow yields.
+
+use crate::flow::intrinsic::Intrinsic;
+use crate::flow::packing::PackingFit;
+use crate::flow::step::FlowStep;
+use crate::geometry::ids::{EdgeVec, VertexVec};
+
+/// A flat metric with cones, and how it was reached.
+#[derive(Clone, Debug)]
+pub struct FlatMetric {
+    /// `u` for vertex scaling, `u − ln γ⁰` for packings, so that the lengths below follow from it and the scheme.
+    pub log_scale: VertexVec<f64>,
+    /// Flat length of every edge, source units: of the surface's own edges, or where there is `intrinsic`, of the edges
+    /// of `intrinsic.flat`.
+    pub length: EdgeVec<f64>,
+    /// The triangulations that the flow with flips went through; `None` where the connectivity stayed.
+    pub intrinsic: Option<Box<Intrinsic>>,
+    /// Curvature reached at every vertex, radians; also where the boundary is free.
+    pub curvature: VertexVec<f64>,
+    /// One entry an iteration.
+    pub history: Vec<FlowStep>,
+    /// max |K − K̄| over the prescribed vertices, radians.
+    pub max_curvature_error: f64,
+    /// Fit of the packing, for circle packings that have one.
+    pub fit: Option<PackingFit>,
+}

@@ -1,0 +1,31 @@
+//! Log scales as one vector: a number `u` for every vertex.
+
+use crate::geometry::ids::VertexVec;
+
+/// Dot product in the order of vertices.
+pub(crate) fn dot(a: &VertexVec<f64>, b: &VertexVec<f64>) -> f64 {
+    a.iter().zip(b.iter()).map(|(a, b)| a * b).sum()
+}
+
+/// u + step · direction.
+pub(crate) fn moved(u: &VertexVec<f64>, direction: &VertexVec<f64>, step: f64) -> VertexVec<f64> {
+    u.iter()
+        .zip(direction.iter())
+        .map(|(u, d)| u + step * d)
+        .collect::<Vec<_>>()
+        .into()
+}
+
+/// Adds a constant to `u`.
+pub(crate) fn shift(u: &mut VertexVec<f64>, constant: f64) {
+    u.as_mut_slice().iter_mut().for_each(|u| *u += constant);
+}
+
+/// Largest minus smallest value.
+pub(crate) fn spread(values: &VertexVec<f64>) -> f64 {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for &x in values.iter() {
+        (low, high) = (low.min(x), high.max(x));
+    }
+    high - low
+}
