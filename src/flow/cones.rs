@@ -29,9 +29,7 @@ mod request;
 mod spread;
 
 pub use error::ConeError;
-pub use params::{
-    BoundaryParams, BoundarySpec, ConeParams, ConeSpec, ConeStrategy, CornerSpec,
-};
+pub use params::{BoundaryParams, BoundarySpec, ConeParams, ConeSpec, ConeStrategy, CornerSpec};
 pub use request::{RequestedCone, Requests, assign};
 
 pub(crate) use super::pi_multiple::in_pi;

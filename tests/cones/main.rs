@@ -78,7 +78,11 @@ fn main() {
     let corpus = std::env::var_os("AFFINE_ATLAS_CORPUS").map(PathBuf::from);
     let mut trials = Vec::new();
     // The longest come first, so that no core waits for them in the end.
-    trials.push(trial("quantum".into(), corpus.clone(), quantum::quarter_turns));
+    trials.push(trial(
+        "quantum".into(),
+        corpus.clone(),
+        quantum::quarter_turns,
+    ));
     trials.push(trial("peers".into(), corpus.clone(), peers::beaten));
     for model in VARIED {
         let case = move |corpus: &Path| stability::invariance(&corpus.join(model));

@@ -11,7 +11,7 @@ pub(super) const DEFAULT_COUNT: usize = 8;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ConeStrategy {
-    /// The list where there is one, else places and curvatures that make [`ConeObjective`] least; see [the module docs](super).
+    /// The list where there is one, else places and curvatures that distort areas least; see [the module docs](super).
     #[default]
     Auto,
     /// Those of the list.

@@ -14,29 +14,23 @@ pub(super) struct Samples {
 }
 
 impl Samples {
+    pub(super) fn none() -> Self {
+        Self {
+            vertices: Vec::new(),
+            nearest: Vec::new(),
+        }
+    }
+
     /// About `count` of those that are `allowed`, those of the lowest `order` first, none within some edges of another.
     pub(super) fn new(c: &Connectivity, allowed: &[bool], order: &[f64], count: usize) -> Self {
         let sorted = sorted(allowed, order);
+        // A few more cost less than those that are missing.
         let vertices = match sorted.len() <= 2 * count {
             true => sorted,
             false => spread(c, sorted, count),
         };
         let nearest = nearest_of(c, &vertices);
         Self { vertices, nearest }
-    }
-}
-
-/// About `count` vertices of those that are `allowed`, far from each other.
-pub(super) fn scattered(
-    c: &Connectivity,
-    allowed: &[bool],
-    order: &[f64],
-    count: usize,
-) -> Vec<usize> {
-    let sorted = sorted(allowed, order);
-    match sorted.len() <= count {
-        true => sorted,
-        false => spread(c, sorted, count),
     }
 }
 
@@ -47,7 +41,10 @@ fn sorted(allowed: &[bool], order: &[f64]) -> Vec<usize> {
 }
 
 fn spread(c: &Connectivity, sorted: Vec<usize>, count: usize) -> Vec<usize> {
-    let radius = ((sorted.len() / count.max(1)) as f64).sqrt().round().max(1.0) as usize;
+    let radius = ((sorted.len() / count.max(1)) as f64)
+        .sqrt()
+        .round()
+        .max(1.0) as usize;
     let mut is_near = vec![false; c.vertex_count()];
     let mut seen = vec![NONE; c.vertex_count()];
     let mut samples = Vec::new();
@@ -103,15 +100,20 @@ fn nearest_of(c: &Connectivity, sources: &[usize]) -> Vec<u32> {
         }
         ring = next;
     }
-    nearest.iter().map(|&i| if i == NONE { 0 } else { i }).collect()
+    nearest
+        .iter()
+        .map(|&i| if i == NONE { 0 } else { i })
+        .collect()
 }
 
-/// At most `count` allowed vertices where a field is greater than around, or less; those first where it is farthest from `level`.
+/// At most `count` allowed vertices where a field is greater than around, or less; those first where it is farthest from `level`, one of
+/// each region before the second of any.
 pub(super) fn extremes(
     c: &Connectivity,
     allowed: &[bool],
     field: &[f64],
     level: f64,
+    regions: &Samples,
     count: usize,
 ) -> Vec<usize> {
     let is_extreme = |v: usize| {
@@ -122,9 +124,17 @@ pub(super) fn extremes(
         !(least..=greatest).contains(&field[v])
     };
     let vertices = (0..field.len()).filter(|&v| allowed[v] && is_extreme(v));
-    let mut extremes: Vec<(f64, usize)> =
-        vertices.map(|v| ((field[v] - level).abs(), v)).collect();
+    let mut extremes: Vec<(f64, usize)> = vertices.map(|v| ((field[v] - level).abs(), v)).collect();
     extremes.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    extremes.truncate(count);
-    extremes.into_iter().map(|(_, v)| v).collect()
+    let mut seen = vec![0u32; regions.vertices.len().max(1)];
+    let mut ranked: Vec<(u32, usize)> = Vec::with_capacity(extremes.len());
+    for (_, v) in extremes {
+        let before = &mut seen[regions.nearest[v] as usize];
+        ranked.push((*before, v));
+        *before += 1;
+    }
+    // Stable: in each round those farthest from the level first.
+    ranked.sort_by_key(|r| r.0);
+    ranked.truncate(count);
+    ranked.into_iter().map(|(_, v)| v).collect()
 }

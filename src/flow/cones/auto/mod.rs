@@ -13,7 +13,7 @@
 //! | what the mesh really does ([`picture`]) | | some steps with the same factor |
 //!
 //! How many: what Gauss–Bonnet and the limits need on a closed surface; on a free boundary, which can take any curvature, what the
-//! interior has by itself and would leave to it. Twice that number, and 8 at least, is what is looked for where `cones.count` is absent. Of these, cones that gain less
+//! interior has by itself and would leave to it; a cone's worth for each loop, 2π, is left to it at most. Twice that number, and 8 at least, is what is looked for where `cones.count` is absent. Of these, cones that gain less
 //! than a hundredth are left out; beyond them come up to 16 more, as long as each lowers the square root of a large objective by a twenty-fifth.
 //!
 //! *Guaranteed:* the same choice for the same surface, moved, scaled or numbered otherwise, unless places tie; never more cones than asked
@@ -45,8 +45,10 @@ use search::{Cones, Count};
 use std::f64::consts::TAU;
 use tableau::Limits;
 
-/// Cones beyond the number that is looked for first, at most.
+/// Cones beyond the number that is looked for first, at most, …
 const MORE: usize = 16;
+/// … where that is no more than this.
+const MANY: usize = 48;
 /// Share of the real objective by which the linear picture may be wrong before it is corrected.
 const AS_PROMISED: f64 = 0.05;
 /// Radii of the rings on which cones move after a correction, in square roots of the area.
@@ -89,7 +91,9 @@ pub(super) fn select(
             let [wanted, most] = match condition {
                 BoundaryCondition::Free => {
                     let wanted = DEFAULT_COUNT.max(2 * needed);
-                    [wanted, wanted + MORE]
+                    // Of many, each gains little.
+                    let more = if wanted <= MANY { MORE } else { 0 };
+                    [wanted, wanted + more]
                 }
                 // Whoever asks for a rectangle wants one.
                 _ => [needed; 2],
@@ -127,10 +131,25 @@ pub(super) fn select(
         sink.clone_from(&picture.weight);
     }
     let mut placement = Placement::new(mesh, picture, background, sink, limits, allowed);
-    let found = match (cones.log_scale_bound, quanta) {
-        (Some(bound), _) => placement.search_bounded(count, bound),
-        (None, _) => placement.search(count),
+    let search = |placement: &mut Placement| match cones.log_scale_bound {
+        Some(bound) => placement.search_bounded(count, bound),
+        None => placement.search(count),
     };
+    let mut found = search(&mut placement);
+    if is_free {
+        // A short border is little area, however much curvature it takes.
+        let own = own_inside(mesh, topology);
+        let total: f64 = found.curvature.iter().sum();
+        let slack = TAU * topology.boundary_loops as f64;
+        let within = total.clamp(own - slack, own + slack);
+        if (total - within).abs() > ROUNDING
+            && least_count(limits.range, within) <= count.wanted
+            && quanta.is_none()
+        {
+            placement.limits.total = Some(within);
+            found = search(&mut placement);
+        }
+    }
     let (found, rule) = match quanta {
         Some(quanta) => {
             let found = in_quanta(&mut placement, found, quanta, count.most);
@@ -220,12 +239,15 @@ fn needed(
         return 0;
     }
     let left = match condition {
-        BoundaryCondition::Free => {
-            TAU * topology.euler_characteristic as f64 - boundary::own_total(mesh)
-        }
+        BoundaryCondition::Free => own_inside(mesh, topology),
         _ => -2.0 * TAU * topology.genus as f64,
     };
     least_count(range, left)
+}
+
+/// The curvature that the interior of the surface has in space, radians.
+fn own_inside(mesh: &Mesh, topology: &Topology) -> f64 {
+    TAU * topology.euler_characteristic as f64 - boundary::own_total(mesh)
 }
 
 fn quanta(size: f64, limits: Limits) -> Result<Quanta, ConeError> {

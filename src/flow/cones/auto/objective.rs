@@ -14,11 +14,13 @@ use crate::flow::solve::inner_products;
 use rayon::prelude::*;
 
 /// Newton steps at most.
-const STEPS: usize = 20;
+const STEPS: usize = 40;
 /// Gain of a step, relative to the objective, after which it is the last: of curvatures that stay …
 pub(super) const SETTLED: f64 = 1e-9;
 /// … and of those that are only compared.
 pub(super) const COMPARED: f64 = 1e-4;
+/// Share of the variance's second derivative in the model where J is 1 or more.
+const BLEND: f64 = 0.5;
 /// Objective that is rounding.
 pub(super) const NOTHING: f64 = 1e-14;
 
@@ -44,7 +46,10 @@ impl State {
         let mut value = 0.0;
         let shares = [2.0, -2.0].map(|sign| {
             let top = u.iter().map(|u| sign * u).fold(f64::NEG_INFINITY, f64::max);
-            let parts = u.iter().zip(weight).map(|(u, w)| w * (sign * u - top).exp());
+            let parts = u
+                .iter()
+                .zip(weight)
+                .map(|(u, w)| w * (sign * u - top).exp());
             let mut parts: Vec<f64> = parts.collect();
             let sum: f64 = parts.iter().sum();
             value += top + sum.ln();
@@ -57,7 +62,11 @@ impl State {
     /// ∂J/∂u of every point.
     pub(super) fn derivative(&self) -> Vec<f64> {
         let [grown, shrunk] = &self.shares;
-        grown.iter().zip(shrunk).map(|(a, b)| 2.0 * (a - b)).collect()
+        grown
+            .iter()
+            .zip(shrunk)
+            .map(|(a, b)| 2.0 * (a - b))
+            .collect()
     }
 
     /// ∂J/∂c of some places.
@@ -66,21 +75,23 @@ impl State {
         answers.par_iter().map(|g| dot(g, &by)).collect()
     }
 
-    /// ∂²J/∂c² of some places, row by row.
-    fn bend(&self, answers: &[&[f64]]) -> Vec<f64> {
+    /// ∂²J/∂c² of some places, row by row, and `blend` times that of the variance fourfold.
+    fn bend(&self, answers: &[&[f64]], weight: &[f64], blend: f64) -> Vec<f64> {
         let count = answers.len();
         let [grown, shrunk] = &self.shares;
-        let means: Vec<[f64; 2]> = answers
+        let even: Vec<f64> = weight.iter().map(|w| 2.0 * blend * w).collect();
+        let means: Vec<[f64; 3]> = answers
             .par_iter()
-            .map(|g| [dot(g, grown), dot(g, shrunk)])
+            .map(|g| [dot(g, grown), dot(g, shrunk), dot(g, weight)])
             .collect();
-        let root: Vec<f64> = grown.iter().zip(shrunk).map(|(a, b)| (a + b).sqrt()).collect();
+        let both = grown.iter().zip(shrunk).zip(&even);
+        let root: Vec<f64> = both.map(|((a, b), c)| (a + b + c).sqrt()).collect();
         let with = |g: &&[f64]| g.iter().zip(&root).map(|(g, r)| g * r).collect();
         let columns: Vec<Vec<f64>> = answers.par_iter().map(with).collect();
         let mut matrix = inner_products(&columns.concat(), count);
         for (row, a) in matrix.chunks_mut(count.max(1)).zip(&means) {
             for (x, b) in row.iter_mut().zip(&means) {
-                *x = 4.0 * (*x - a[0] * b[0] - a[1] * b[1]);
+                *x = 4.0 * (*x - a[0] * b[0] - a[1] * b[1] - 2.0 * blend * a[2] * b[2]);
             }
         }
         matrix
@@ -110,16 +121,33 @@ impl Points<'_> {
         State::new(self.weight, &self.log_scale(answers, curvature))
     }
 
-    /// The second-order picture of the objective around some curvatures, all of them held at 0.
+    /// A second-order picture of the objective around some curvatures, all of them held at 0.
+    ///
+    /// Where much is distorted, little area rules J and its second derivative, which then says nothing about the rest. The variance
+    /// does, so a share of that is added, which falls with J: Newton's method with it converges, if more slowly.
     pub(super) fn model(&self, answers: &[&[f64]], curvature: &[f64], limits: Limits) -> Tableau {
         let state = self.state(answers, curvature);
-        let matrix = state.bend(answers);
+        let blend = BLEND * state.value.clamp(0.0, 1.0);
+        let matrix = state.bend(answers, self.weight, blend);
         let mut slope = state.slope(answers);
         let rows = matrix.chunks(answers.len().max(1));
         for (slope, row) in slope.iter_mut().zip(rows) {
             *slope -= dot(row, curvature);
         }
         Tableau::new(&matrix, &slope, limits)
+    }
+
+    /// Four times the variance of u, which J is where it is small, as a function of the curvatures; exact, so that no place for it need be near.
+    pub(super) fn variance(&self, answers: &[&[f64]], limits: Limits) -> Tableau {
+        let even = State {
+            value: 0.0,
+            shares: [self.weight.to_vec(), self.weight.to_vec()],
+        };
+        let mean = dot(self.base, self.weight);
+        let by = self.base.iter().zip(self.weight);
+        let by: Vec<f64> = by.map(|(u, w)| 8.0 * w * (u - mean)).collect();
+        let slope: Vec<f64> = answers.par_iter().map(|g| dot(g, &by)).collect();
+        Tableau::new(&even.bend(answers, self.weight, 0.0), &slope, limits)
     }
 
     /// The best curvatures from some that are near; `settled`: gain of the last step.

@@ -146,7 +146,11 @@ impl Picture {
         let mut step = vec![0.0; self.len()];
         let (mut least, mut length) = (f64::INFINITY, 1.0);
         for _ in 0..LOOKS {
-            let u: Vec<f64> = nearest.iter().zip(&step).map(|(u, s)| u + length * s).collect();
+            let u: Vec<f64> = nearest
+                .iter()
+                .zip(&step)
+                .map(|(u, s)| u + length * s)
+                .collect();
             metric.evaluate(&self.on_double(&u), &mut evaluation);
             let reached = evaluation.curvature.iter().zip(target).zip(&self.share);
             let missing = reached.map(|((k, target), share)| match *share > 0.0 {

@@ -34,6 +34,8 @@ pub(super) struct Placement<'a> {
     /// Where cones may be.
     pub(super) allowed: Vec<bool>,
     pub(super) samples: Samples,
+    /// Regions of the surface, from each of which places for cones are taken.
+    pub(super) regions: Samples,
     /// Answers that were computed: the search comes back to the same places again and again.
     known: BTreeMap<usize, Arc<[f64]>>,
 }
@@ -56,6 +58,7 @@ impl<'a> Placement<'a> {
         let count = (base.len() / each).clamp(least, most);
         Self {
             samples: Samples::new(connectivity, &allowed, &base, count),
+            regions: Samples::none(),
             known: BTreeMap::new(),
             mesh,
             connectivity,

@@ -17,7 +17,9 @@ const PASSES: [usize; 3] = [192, 24, 3];
 const DETOURS: [usize; 2] = [48, 16];
 /// How many cones are added, as shares of their number, before as many are taken away again.
 const MORE: [f64; 3] = [1.0, 0.5, 0.25];
-/// The same at the least and at most.
+/// Parts of the cones after which J is looked at anew.
+const PARTS: [usize; 3] = [4, 2, 1];
+/// How many more, at the least and at most.
 const MORE_CONES: [usize; 2] = [2, 16];
 
 /// Places, as cells see them.
@@ -151,7 +153,12 @@ impl Pool {
     }
 
     /// Exchanges members for other places as long as that gains; `may`: which member may go to which place.
-    pub(super) fn exchange(&self, mut set: Set, rule: Rule, may: impl Fn(usize, usize) -> bool) -> Set {
+    pub(super) fn exchange(
+        &self,
+        mut set: Set,
+        rule: Rule,
+        may: impl Fn(usize, usize) -> bool,
+    ) -> Set {
         let [all, most, least] = PASSES;
         for _ in 0..(all / set.members.len().max(1)).clamp(least, most) {
             if set.value <= NOTHING {
@@ -166,7 +173,9 @@ impl Pool {
                     break None;
                 }
                 let next = self.read(&tried, rule);
-                if next.value < set.value * (1.0 - LEAST_GAIN) && next.members.len() <= set.members.len() {
+                if next.value < set.value * (1.0 - LEAST_GAIN)
+                    && next.members.len() <= set.members.len()
+                {
                     break Some(next);
                 }
                 most = made / 4;
@@ -237,8 +246,31 @@ impl Pool {
 
     /// Adds the places that gain most, until there are `count`.
     pub(super) fn grow(&self, set: Set, count: usize) -> Set {
-        let mut model = self.model(&set, Rule::Best);
-        let mut now = set.members.len();
+        let model = self.model(&set, Rule::Best);
+        self.grown(model, set.members.len(), count)
+    }
+
+    /// `count` of the places, or fewer where there are no more: from those that lower the variance most, and where that is cheap from those
+    /// that lower J most, some at a time.
+    pub(super) fn best(&self, count: usize) -> Set {
+        let all: Vec<usize> = (0..self.len()).collect();
+        let model = self.points().variance(&self.answers(&all), self.limits);
+        let even = self.improve(self.grown(model, 0, count), count);
+        if count > DETOURS[1] {
+            return even;
+        }
+        let mut other = self.weigh(Vec::new(), &[], Rule::Fixed);
+        for part in PARTS {
+            other = self.grow(other, count.div_ceil(part));
+        }
+        let other = self.improve(other, count);
+        match other.value < even.value * (1.0 - LEAST_GAIN) {
+            true => other,
+            false => even,
+        }
+    }
+
+    fn grown(&self, mut model: Tableau, mut now: usize, count: usize) -> Set {
         let mut refused = vec![false; self.len()];
         while now < count {
             let others = (0..self.len()).filter(|&j| !model.is_in(j) && !refused[j]);
@@ -255,7 +287,7 @@ impl Pool {
     }
 
     /// Takes away the members that are worth least, until `count` are left.
-    fn prune(&self, set: Set, count: usize) -> Set {
+    pub(super) fn prune(&self, set: Set, count: usize) -> Set {
         let mut model = self.model(&set, Rule::Best);
         let mut now = (0..self.len()).filter(|&i| model.is_in(i)).count();
         while now > count {
@@ -271,16 +303,6 @@ impl Pool {
             now -= 1;
         }
         self.read(&model, Rule::Best)
-    }
-
-    /// The best set without one of its members.
-    pub(super) fn one_less(&self, set: &Set) -> Set {
-        self.prune(set.clone(), set.members.len().saturating_sub(1))
-    }
-
-    /// No cones, and what they cost.
-    pub(super) fn nothing(&self) -> Set {
-        self.weigh(Vec::new(), &[], Rule::Fixed)
     }
 
     /// `count` of the places, or fewer where there are no more, better than the set where that is possible.

@@ -147,7 +147,8 @@ impl Quanta {
                 // All of it, or one quantum.
                 for amount in [1, numbers[i]] {
                     let (a, b) = (numbers[i] - amount, numbers[j] + amount);
-                    let is_nothing = amount == 0 || (numbers[i] == 0 && numbers[j] == 0 && full + 2 > count);
+                    let is_nothing =
+                        amount == 0 || (numbers[i] == 0 && numbers[j] == 0 && full + 2 > count);
                     if is_nothing || !keeps(i, a, j, b) {
                         continue;
                     }

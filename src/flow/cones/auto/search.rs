@@ -8,7 +8,7 @@
 //! around x where c p is least: one a ring, narrower and narrower rings. Because J is convex in the curvature, a move from x to y gains at most
 //! c (p(x) − p(y)): most places need not be looked at.
 
-use super::candidates::{extremes, scattered};
+use super::candidates::{Samples, extremes};
 use super::placement::Placement;
 use super::pool::{LEAST_GAIN, Pool, Rule, Set};
 use crate::flow::cones::params::DEFAULT_COUNT;
@@ -17,7 +17,7 @@ use crate::geometry::ids::VertexId;
 use crate::geometry::mesh::triangle_area;
 
 /// Places spread over the surface, extremes of the log scale and of the force in the first pool at least, and for each cone wanted.
-const SPREAD: [f64; 2] = [16.0, 0.5];
+const SPREAD: [f64; 2] = [16.0, 1.0];
 const EXTREMES: [f64; 2] = [16.0, 1.0];
 /// Rounds of widening the pool by extremes of the force, each of which must gain …
 const ROUNDS: usize = 2;
@@ -31,6 +31,8 @@ const FEW: usize = 48;
 const RINGS: usize = 3;
 /// Vertices on rings that are tried at once at most, but one for each cone.
 const RING_PLACES: usize = 96;
+/// Cones of which one at a time is looked at as idle.
+const MANY: usize = 32;
 /// Square root of the objective under which a cone is idle, whatever it gains.
 pub(super) const EVEN: f64 = 2e-6;
 
@@ -68,22 +70,15 @@ impl Placement<'_> {
         let base = self.base.clone();
         let level = self.mean(&base);
         let force = self.force(&base);
-        let mut places = extremes(self.connectivity, &self.allowed, &base, level, extreme);
+        let (c, allowed) = (self.connectivity, &self.allowed);
+        let regions = Samples::new(c, allowed, &base, spread);
+        let mut places = extremes(c, allowed, &base, level, &regions, extreme);
         let middle = self.mean(&force);
-        let pulled = extremes(self.connectivity, &self.allowed, &force, middle, extreme);
-        places.extend(pulled);
-        places.extend(scattered(self.connectivity, &self.allowed, &base, spread));
+        places.extend(extremes(c, allowed, &force, middle, &regions, extreme));
+        places.extend(&regions.vertices);
         unique(&mut places);
+        self.regions = regions;
         Pool::new(self, places)
-    }
-
-    /// The best of a pool, from nothing.
-    pub(super) fn first_set(pool: &Pool, count: usize) -> Set {
-        let mut set = pool.nothing();
-        for part in [4, 2, 1] {
-            set = pool.grow(set, count.div_ceil(part));
-        }
-        set
     }
 
     /// A pool with the extremes of the force more, and the set in it.
@@ -100,6 +95,7 @@ impl Placement<'_> {
             &self.allowed,
             &force,
             level,
+            &self.regions,
             extreme,
         ));
         unique(&mut places);
@@ -111,9 +107,9 @@ impl Placement<'_> {
     /// The cones that lower the objective most.
     pub(super) fn search(&mut self, count: Count) -> Cones {
         let mut pool = self.first_pool(count.wanted);
-        let mut set = Self::first_set(&pool, count.wanted);
-        set = pool.improve(set, count.wanted);
-        for _ in 0..ROUNDS {
+        let mut set = pool.best(count.wanted);
+        let rounds = if count.wanted <= FEW { ROUNDS } else { 1 };
+        for _ in 0..rounds {
             let before = set.value;
             (pool, set) = self.widened(pool, &set, count.wanted);
             set = pool.improve(set, count.wanted);
@@ -200,7 +196,9 @@ impl Placement<'_> {
                 // The last is a disk.
                 let inner = if ring + 1 == rings { 0.0 } else { 0.5 * outer };
                 let on = around.iter().filter(|(_, d)| (inner..=outer).contains(d));
-                let open = on.map(|(w, _)| *w).filter(|w| self.allowed[*w] && !taken.contains(w));
+                let open = on
+                    .map(|(w, _)| *w)
+                    .filter(|w| self.allowed[*w] && !taken.contains(w));
                 let best = open.reduce(|a, b| if c * force[b] < c * force[a] { b } else { a });
                 let may_gain = |w: &usize| c * (force[v] - force[*w]) > worth;
                 if let Some(best) = best.filter(may_gain) {
@@ -226,7 +224,9 @@ impl Placement<'_> {
 
     fn area(&self) -> f64 {
         let faces = self.connectivity.faces();
-        faces.map(|f| triangle_area(self.mesh.face_positions(f))).sum()
+        faces
+            .map(|f| triangle_area(self.mesh.face_positions(f)))
+            .sum()
     }
 
     fn without_idle(&mut self, cones: Cones, count: Count) -> Cones {
@@ -271,7 +271,10 @@ fn share(count: usize) -> f64 {
 /// Takes away cones that do not pay, as long as more than the least number are left.
 fn fewer(pool: &Pool, mut set: Set, count: Count) -> Set {
     while set.members.len() > count.least {
-        let next = pool.one_less(&set);
+        let now = set.members.len();
+        // Of very many, some at a time.
+        let step = now.div_ceil(MANY).min(now - count.least);
+        let next = pool.prune(set.clone(), now - step);
         let pays = share(set.members.len())
             * match set.members.len() > count.wanted {
                 true => PAYS_MUCH,
@@ -279,7 +282,7 @@ fn fewer(pool: &Pool, mut set: Set, count: Count) -> Set {
             };
         let (with, without) = (set.value.max(0.0).sqrt(), next.value.max(0.0).sqrt());
         if next.members.len() >= set.members.len()
-            || (without > EVEN && without > with * (1.0 + pays))
+            || (without > EVEN && without > with * (1.0 + pays).powi(step as i32))
         {
             break;
         }

@@ -238,7 +238,10 @@ impl Tableau {
             true if self.must_stay() => return self.first_instead(i, j),
             true => {
                 let factor = x / self.at(i, i);
-                (self.right[j] - factor * self.right[i], self.at(j, j) - factor * x)
+                (
+                    self.right[j] - factor * self.right[i],
+                    self.at(j, j) - factor * x,
+                )
             }
             false => (self.right[j] - x * self.level[i], self.at(j, j)),
         };
