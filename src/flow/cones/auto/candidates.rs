@@ -6,6 +6,10 @@
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{NONE, VertexId};
 
+/// How far apart vertices are that are spread over a surface, in edges, where as many squares of that side would cover it: with this share
+/// they are at least as many as asked for.
+const APART: f64 = 0.7;
+
 /// Vertices spread over the surface by edges, and the one of them that each vertex is nearest to.
 pub(super) struct Samples {
     pub(super) vertices: Vec<usize>,
@@ -24,7 +28,6 @@ impl Samples {
     /// About `count` of those that are `allowed`, those of the lowest `order` first, none within some edges of another.
     pub(super) fn new(c: &Connectivity, allowed: &[bool], order: &[f64], count: usize) -> Self {
         let sorted = sorted(allowed, order);
-        // A few more cost less than those that are missing.
         let vertices = match sorted.len() <= 2 * count {
             true => sorted,
             false => spread(c, sorted, count),
@@ -41,10 +44,8 @@ fn sorted(allowed: &[bool], order: &[f64]) -> Vec<usize> {
 }
 
 fn spread(c: &Connectivity, sorted: Vec<usize>, count: usize) -> Vec<usize> {
-    let radius = ((sorted.len() / count.max(1)) as f64)
-        .sqrt()
-        .round()
-        .max(1.0) as usize;
+    let apart = APART * (sorted.len() as f64 / count.max(1) as f64).sqrt();
+    let radius = apart.round().max(1.0) as usize;
     let mut is_near = vec![false; c.vertex_count()];
     let mut seen = vec![NONE; c.vertex_count()];
     let mut samples = Vec::new();

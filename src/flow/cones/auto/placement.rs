@@ -15,7 +15,7 @@ use std::sync::Arc;
 /// Numbers in the answers that are kept.
 const KNOWN: usize = 1 << 24;
 /// Cells of the surface: one for so many vertices, at least, and at most.
-const SAMPLES: [usize; 3] = [8, 600, 1500];
+const SAMPLES: [usize; 3] = [8, 500, 1000];
 /// Places that are answered side by side.
 const TOGETHER: usize = 32;
 

@@ -248,7 +248,11 @@ fn more(pool: &Pool, mut set: Set, count: Count) -> Set {
         let longer = AHEAD.into_iter().filter(|more| now + more <= count.most);
         let better = longer.map(|more| {
             let next = pool.grow(set.clone(), now + more);
-            (more, pool.exchange(next, Rule::Best, |_, _| true))
+            let next = pool.exchange(next, Rule::Best, |_, _| true);
+            // From where these are, there may be no way to where so many more would be.
+            let anew = (more == AHEAD[2]).then(|| pool.best(now + more));
+            let anew = anew.filter(|anew| anew.value < next.value);
+            (more, anew.unwrap_or(next))
         });
         let mut better = better.filter(|(more, next)| {
             let pays = PAYS_MUCH * share(now);
