@@ -7,6 +7,7 @@
 mod common;
 mod defaults;
 mod dense;
+mod genus;
 mod limits;
 mod linear;
 mod models;
@@ -116,6 +117,13 @@ fn main() {
         trials.push(trial(format!("prediction/{model}"), corpus.clone(), case));
         let case = move |corpus: &Path| linear::stationary(&corpus.join(model));
         trials.push(trial(format!("stationary/{model}"), corpus.clone(), case));
+    }
+    for genus in [0, 5, 24, 47, 73, 100] {
+        for is_open in [false, true] {
+            let case = move |_: &Path| genus::by_default(genus, is_open);
+            let name = format!("genus/{genus}{}", if is_open { ", open" } else { "" });
+            trials.push(trial(name, here(), case));
+        }
     }
     for shape in optimality::SHAPES {
         let case = move |_: &Path| optimality::brute_force(shape);

@@ -125,6 +125,22 @@ pub fn distortion(mesh: &Mesh, prescription: &Prescription) -> Result<Distortion
     Ok(Distortion { area, std, cost })
 }
 
+/// J = ln ∫e^{2u} + ln ∫e^{−2u} over the area of a number at each vertex.
+pub fn cost(mesh: &Mesh, u: &[f64]) -> f64 {
+    let c = &mesh.connectivity;
+    let (mut total, mut grown, mut shrunk) = (0.0, 0.0, 0.0);
+    for f in c.faces() {
+        let share = triangle_area(mesh.face_positions(f)) / 3.0;
+        for v in c.face_vertices(f) {
+            let factor = (2.0 * u[v.index()]).exp();
+            total += share;
+            grown += share * factor;
+            shrunk += share / factor;
+        }
+    }
+    f64::ln(grown / total) + f64::ln(shrunk / total)
+}
+
 /// Standard deviation over the area of a number at each vertex.
 pub fn deviation(mesh: &Mesh, u: &[f64]) -> f64 {
     let c = &mesh.connectivity;
