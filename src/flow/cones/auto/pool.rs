@@ -17,6 +17,8 @@ const PASSES: [usize; 3] = [192, 24, 3];
 const DETOURS: [usize; 2] = [48, 16];
 /// How many cones are added, as shares of their number, before as many are taken away again.
 const MORE: [f64; 3] = [1.0, 0.5, 0.25];
+/// Points of all searches from a first cone of their own.
+const STARTS: usize = 2000;
 /// Parts of the cones after which J is looked at anew.
 const PARTS: [usize; 3] = [4, 2, 1];
 /// How many more, at the least and at most.
@@ -263,11 +265,20 @@ impl Pool {
         for part in PARTS {
             other = self.grow(other, count.div_ceil(part));
         }
-        let other = self.improve(other, count);
-        match other.value < even.value * (1.0 - LEAST_GAIN) {
-            true => other,
-            false => even,
+        let mut others = vec![other];
+        // On a small mesh, where that is cheap, each of several places is the first in turn.
+        let starts = STARTS / self.weight.len().max(1);
+        for first in (0..self.len()).take(starts) {
+            others.push(self.weigh(vec![first], &[0.0], Rule::Best));
         }
+        let mut best = even;
+        for other in others {
+            let other = self.improve(self.grow(other, count), count);
+            if other.value < best.value * (1.0 - LEAST_GAIN) {
+                best = other;
+            }
+        }
+        best
     }
 
     fn grown(&self, mut model: Tableau, mut now: usize, count: usize) -> Set {

@@ -107,8 +107,8 @@ impl Tableau {
             self.right[i] -= factor * right;
         }
         let sign = if self.is_free[k] { -1.0 } else { 1.0 };
-        for i in 0..size {
-            let x = sign * row[i] / pivot;
+        for (i, r) in row.iter().enumerate() {
+            let x = sign * r / pivot;
             self.entry[k * size + i] = x;
             self.entry[i * size + k] = x;
         }
