@@ -16,7 +16,7 @@ use crate::flow::ricci::FlatMetric;
 use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId, NONE};
 use crate::geometry::mesh::{Mesh, distance as distance3, triangle_area};
 use crate::geometry::triangle::{angles, area};
-use crate::product::{MeanMax, Quality, Spread};
+use crate::product::{MeanMax, Quality, Spread, Verdict};
 use std::collections::HashMap;
 use std::f64::consts::FRAC_PI_2;
 
@@ -41,6 +41,7 @@ pub fn measure(
     Quality {
         area_distortion,
         log_scale,
+        verdict: Verdict::of(&log_scale),
         angle_error,
         layout_closing_error: closing_error(mesh, cut, central, metric),
         cut_length: cut_length(mesh, cut),

@@ -86,12 +86,25 @@ pub fn expand(entries: &[PathBuf], base: &Path, output: &Path) -> Result<Inputs,
         inputs: Inputs::default(),
     };
     for entry in entries {
-        match entry.to_str().and_then(|text| text.strip_prefix('@')) {
-            Some(list) if !base.join(entry).exists() => search.list(Path::new(list), base)?,
+        match listed(entry) {
+            Some(list) if !base.join(entry).exists() => search.list(&list, base)?,
             _ => search.entry(entry, base, false)?,
         }
     }
     Ok(search.inputs)
+}
+
+/// The file that `@file` names, whatever bytes its name has.
+#[cfg(unix)]
+fn listed(entry: &Path) -> Option<PathBuf> {
+    use std::os::unix::ffi::OsStrExt;
+    let name = entry.as_os_str().as_bytes().strip_prefix(b"@")?;
+    Some(std::ffi::OsStr::from_bytes(name).into())
+}
+
+#[cfg(not(unix))]
+fn listed(entry: &Path) -> Option<PathBuf> {
+    entry.to_str()?.strip_prefix('@').map(PathBuf::from)
 }
 
 /// Largest list of meshes that is read (bytes).

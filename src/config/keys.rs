@@ -504,6 +504,15 @@ pub const KEYS: &[Key] = &[
         "500000",
     ),
     key(
+        "report.distortion_warning",
+        Kind::Number {
+            min: 0.0,
+            max: 1000.0,
+        },
+        "natural logarithms of length",
+        "0.5",
+    ),
+    key(
         "run.jobs",
         Kind::Integer { min: 0, max: 1024 },
         "meshes",

@@ -25,7 +25,7 @@ use crate::atlas::geometry_image::SourceSurface;
 use crate::atlas::patches::Domain;
 use crate::atlas::rectangles::Charted;
 use crate::atlas::{charts, develop, geometry_image, patches, rectangles};
-use crate::config::{Config, PatchParams};
+use crate::config::Config;
 use crate::export::folder::{Staging, component_name, list_files};
 use crate::export::{self, ExportError, Provenance, pictures, report as report_page};
 use crate::flow::cones::{self, Requests};
@@ -253,7 +253,7 @@ fn run_stages(
         return Err(BuildError::Cancelled);
     }
     for (index, atlas) in atlases.iter().enumerate() {
-        for note in atlas.iter().flat_map(|atlas| unmet(atlas, &config.patches)) {
+        for note in atlas.iter().flat_map(|atlas| warnings(atlas, config)) {
             let note = match atlases.len() {
                 1 => format!("{given} {note}"),
                 _ => format!("component {index} of {given} {note}"),
@@ -293,9 +293,17 @@ fn run_stages(
     Ok(())
 }
 
-/// What was asked of patches and could not be had, beginning with a verb.
-fn unmet(atlas: &AffineAtlas, params: &PatchParams) -> Vec<String> {
+/// What was asked for and could not be had, and much distortion, beginning with a verb.
+fn warnings(atlas: &AffineAtlas, config: &Config) -> Vec<String> {
     let mut notes = Vec::new();
+    let (quality, most) = (&atlas.quality, config.report.distortion_warning);
+    if quality.log_scale.std > most {
+        notes.push(format!(
+            "is drawn unevenly: the log scale deviates by {:.2} (report.distortion_warning = {most}), area distortion (9) is {:.2}; more cones help (`affine-atlas cones` shows how much), `affine-atlas explain` shows where",
+            quality.log_scale.std, quality.area_distortion
+        ));
+    }
+    let params = &config.patches;
     let count = atlas.patches.patches.len();
     if let Some(most) = params.max_count.filter(|&most| count > most) {
         notes.push(format!(

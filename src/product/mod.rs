@@ -86,6 +86,33 @@ pub struct MeanMax {
     pub max: f64,
 }
 
+/// The distortion in a word: the standard deviation σ of the log scale, which a factor of e^σ in lengths stands for.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// σ ≤ 0.25: two thirds of the surface are drawn within 28 % of the mean size.
+    #[default]
+    Good,
+    /// σ ≤ 0.5: within 65 %.
+    Fair,
+    /// More: parts of the surface are drawn very large or very small.
+    Poor,
+}
+
+impl Verdict {
+    /// The verdict on a log scale.
+    #[must_use]
+    pub fn of(log_scale: &Spread) -> Self {
+        match log_scale.std {
+            std if std <= 0.25 => Self::Good,
+            std if std <= 0.5 => Self::Fair,
+            _ => Self::Poor,
+        }
+    }
+}
+
 /// How well the atlas turned out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Quality {
@@ -93,6 +120,9 @@ pub struct Quality {
     pub area_distortion: f64,
     /// ½ ln(flat area / source area) a face, both totals 1, weighted by source area.
     pub log_scale: Spread,
+    /// The distortion in a word.
+    #[serde(default)]
+    pub verdict: Verdict,
     /// Difference of corner angles, radians.
     pub angle_error: MeanMax,
     /// Worst mismatch of the development, source units.

@@ -3,9 +3,15 @@ use super::corpus::{self, soup};
 use super::*;
 use crate::geometry::mesh::{AttributeKind, CornerAttribute, triangle_area};
 
+/// What comes out, in source units.
 fn repaired(soup: &Soup) -> Repaired {
-    let repaired = repair(soup, &RepairParams::default()).unwrap();
+    let mut repaired = repair(soup, &RepairParams::default()).unwrap();
     check(&repaired, soup);
+    for component in &mut repaired.components {
+        if let Ok(mesh) = &mut component.mesh {
+            component.frame.leave_all(&mut mesh.positions);
+        }
+    }
     repaired
 }
 
@@ -35,7 +41,8 @@ fn check(repaired: &Repaired, soup: &Soup) {
         assert_eq!(known.iter().min(), Some(&component.first_source_vertex));
         for (v, &source) in mesh.source_vertex.enumerate() {
             if source != NONE {
-                assert_eq!(mesh.positions[v], soup.positions[source as usize]);
+                let position = component.frame.leave(mesh.positions[v]);
+                assert_eq!(position, soup.positions[source as usize]);
                 assert!(repaired.locate(source).is_some());
             }
         }

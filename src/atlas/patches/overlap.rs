@@ -357,25 +357,32 @@ mod tests {
             }
         }
         assert!(refused > 100 && kept.len() > 100);
-        // Much larger ones, thin and thick, near and far.
+        // Much larger ones, thin and thick, near and far, beside a few small ones.
+        let mut index = TriangleIndex::new([1.0 / 4000.0, 1.0 / 4000.0], 1e-12);
+        let few: Vec<Triangle> = (0..40)
+            .map(|_| {
+                moved(
+                    T,
+                    1.0 / 4000.0,
+                    [8.0 * random() - 4.0, 8.0 * random() - 4.0],
+                )
+            })
+            .collect();
+        few.iter().for_each(|&t| index.insert(t));
         let mut answers = [0; 2];
-        for i in 0..2000 {
-            let scale = (40.0 * random()).exp2();
-            let thin = if i % 2 == 0 { 1e-6 } else { 1.0 };
-            let t = T.map(|p| {
-                [
-                    scale * (p[0] - 0.5) + random(),
-                    thin * scale * (p[1] - 0.5) + 8.0 * random() - 4.0,
-                ]
+        for i in 0..4000 {
+            let (size, width) = (
+                (40.0 * random()).exp2(),
+                if i % 2 == 0 { 1e-3 } else { 1.0 },
+            );
+            let (s, c) = (7.0 * random()).sin_cos();
+            let start = [8.0 * random() - 4.0, 8.0 * random() - 4.0];
+            // Long, and turned: its box holds all the small ones, it itself few.
+            let t = [[-0.5, 0.0], [0.5, 0.0], [0.0, width / size.max(1.0)]].map(|[x, y]| {
+                let (x, y) = (size * x, size * y);
+                [start[0] + c * x - s * y, start[1] + s * x + c * y]
             });
-            let t = if (t[1][0] - t[0][0]) * (t[2][1] - t[0][1])
-                > (t[2][0] - t[0][0]) * (t[1][1] - t[0][1])
-            {
-                t
-            } else {
-                [t[0], t[2], t[1]]
-            };
-            let brute = kept.iter().any(|k| overlap(&t, k, 1e-12));
+            let brute = few.iter().any(|k| overlap(&t, k, 1e-12));
             assert_eq!(index.overlaps(&t), brute, "{t:?}");
             answers[usize::from(brute)] += 1;
         }

@@ -205,13 +205,9 @@ mod tests {
         let corners = vec![at(0, 0), at(1, 0), at(1, 1), at(0, 1), at(2, 0), at(2, 1)];
         let faces = vec![[0, 1, 3], [1, 2, 3], [1, 4, 2], [4, 5, 2]];
         let repaired = repair(&soup(corners, faces), &RepairParams::default()).unwrap();
-        let mesh = repaired
-            .components
-            .into_iter()
-            .next()
-            .unwrap()
-            .mesh
-            .unwrap();
+        let component = repaired.components.into_iter().next().unwrap();
+        let mut mesh = component.mesh.unwrap();
+        component.frame.leave_all(&mut mesh.positions);
         let v = |source: u32| {
             let position = mesh.source_vertex.iter().position(|&s| s == source);
             VertexId::new(position.unwrap())

@@ -42,6 +42,8 @@ pub struct ReportParams {
     pub enabled: bool,
     /// Most faces of a surface that is drawn on the page.
     pub max_faces: usize,
+    /// Standard deviation of the log scale above which a build warns of distortion, natural logarithm of length.
+    pub distortion_warning: f64,
 }
 
 impl Default for ReportParams {
@@ -50,6 +52,7 @@ impl Default for ReportParams {
         Self {
             enabled: true,
             max_faces: 500_000,
+            distortion_warning: 0.5,
         }
     }
 }

@@ -236,7 +236,9 @@ fn the_record_of_a_long_flow_stays_short() {
     .unwrap();
     let last = flat.history.last().unwrap();
     assert!(flat.history.len() <= 4097 && flat.history[0].iteration == 0);
-    assert!(last.max_error == flat.max_curvature_error);
+    // The record is that of the flow; what it leaves is taken by Newton's method.
+    assert!(last.max_error <= FlowParams::default().curvature_tolerance);
+    assert!(flat.max_curvature_error <= 0.5 * last.max_error);
     assert!(
         flat.history
             .windows(2)

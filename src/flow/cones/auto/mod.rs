@@ -53,6 +53,9 @@ const MANY: usize = 48;
 const AS_PROMISED: f64 = 0.05;
 /// Radii of the rings on which cones move after a correction, in square roots of the area.
 const SETTLED_RADII: [f64; 1] = [0.01];
+/// Vertices of a small mesh, and how often all of it is looked at anew at most.
+const SMALL: usize = 2000;
+const LOOKS: usize = 4;
 /// Curvatures in excess of a limit that are rounding, radians.
 const ROUNDING: f64 = 1e-9;
 
@@ -162,7 +165,7 @@ pub(super) fn select(
         }
         None => (found, Rule::Best),
     };
-    let found = settle(&mut placement, found, rule);
+    let found = settle(&mut placement, found, rule, search);
     let cone = |(&v, &curvature): (&usize, &f64)| {
         let vertex = VertexId::new(v);
         RequestedCone {
@@ -199,21 +202,40 @@ fn in_quanta(
 }
 
 /// Another look, with the log scale that the mesh really has in place of that of the linear picture: where that promised something else,
-/// places and curvatures are improved near where they are, and kept if the mesh agrees that they are better.
-fn settle(placement: &mut Placement, found: Cones, rule: Rule) -> Cones {
-    let real = placement.real_log_scale(&found.vertices, &found.curvature);
+/// places and curvatures are improved near where they are, and kept if the mesh agrees that they are better. On a small mesh, where strong cones
+/// stand for few faces each and the picture may be far off, all places are looked at anew as well, again and again as long as that gains.
+fn settle(
+    placement: &mut Placement,
+    mut found: Cones,
+    rule: Rule,
+    search: impl Fn(&mut Placement) -> Cones,
+) -> Cones {
+    let mut real = placement.real_log_scale(&found.vertices, &found.curvature);
     let promised = placement.log_scale_of(&found.vertices, &found.curvature);
-    let [now, promised] = [&real, &promised].map(|u| placement.cost(u));
+    let [mut now, promised] = [&real, &promised].map(|u| placement.cost(u));
     if (now - promised).abs() <= AS_PROMISED * now {
         return found;
     }
-    placement.correct(&found.vertices, &found.curvature, &real);
-    let moved = placement.approach(found.clone(), &SETTLED_RADII, rule);
-    let next = placement.real_log_scale(&moved.vertices, &moved.curvature);
-    match placement.cost(&next) < now {
-        true => moved,
-        false => found,
+    let is_small = real.len() <= SMALL && rule == Rule::Best;
+    for _ in 0..if is_small { LOOKS } else { 1 } {
+        placement.correct(&found.vertices, &found.curvature, &real);
+        let mut tried = vec![placement.approach(found.clone(), &SETTLED_RADII, rule)];
+        if is_small {
+            tried.push(search(placement));
+        }
+        let before = now;
+        for cones in tried {
+            let u = placement.real_log_scale(&cones.vertices, &cones.curvature);
+            let cost = placement.cost(&u);
+            if cost < now {
+                (now, real, found) = (cost, u, cones);
+            }
+        }
+        if now >= before {
+            break;
+        }
     }
+    found
 }
 
 /// The fewest cones that can make up a total within limits.
