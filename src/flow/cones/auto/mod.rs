@@ -191,9 +191,22 @@ fn in_quanta(
     let others = placement.first_pool(count).vertices;
     places.extend(others.into_iter().filter(|v| !found.vertices.contains(v)));
     let pool = pool::Pool::new(placement, places);
-    let members = (0..found.vertices.len()).collect();
-    let start = pool.weigh(members, &found.curvature, Rule::Fixed);
-    let set = quanta.search(&pool, &start, count)?;
+    let members: Vec<usize> = (0..found.vertices.len()).collect();
+    let start = pool.weigh(members, &found.curvature, Rule::Best);
+    // From the choice, and from the same without some of its cones, in whose stead others appear; and with smaller and smaller numbers of quanta at
+    // one cone, since a few large ones and many small ones are different surfaces.
+    let mut best: Option<pool::Set> = None;
+    for quanta in quanta.caps(count) {
+        for fewer in 0..=start.members.len().div_ceil(2) {
+            let start = pool.prune(start.clone(), start.members.len() - fewer);
+            let set = quanta.search(&pool, &start, count);
+            best = set
+                .into_iter()
+                .chain(best)
+                .min_by(|a, b| a.value.total_cmp(&b.value));
+        }
+    }
+    let set = best?;
     let found = Cones {
         vertices: pool.places(&set),
         curvature: set.curvature,

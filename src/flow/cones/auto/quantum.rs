@@ -14,6 +14,9 @@ use super::tableau::{Limits, Tableau};
 /// Rounds of steps, each on a model of its own.
 const PASSES: usize = 16;
 
+/// Greatest numbers of quanta at a cone that are tried.
+const CAPS: usize = 3;
+
 /// Whole numbers of one quantum.
 #[derive(Clone, Copy)]
 pub(super) struct Quanta {
@@ -51,6 +54,18 @@ impl Quanta {
             ],
             total,
         })
+    }
+
+    /// The same with each greatest number at a cone that lets `count` cones meet the total, the smallest first.
+    pub(super) fn caps(self, count: usize) -> Vec<Self> {
+        let [low, high] = self.range;
+        let enough = |cap: &i64| self.total.is_none_or(|total| cap * count as i64 >= total);
+        let caps = (1..=high.max(1)).filter(|cap| *cap <= high && enough(cap));
+        let capped = |cap: i64| Self {
+            range: [low, cap],
+            ..self
+        };
+        caps.take(CAPS).map(capped).collect()
     }
 
     fn allows(self, k: i64) -> bool {
