@@ -2,11 +2,11 @@
 
 use crate::common::Triangles;
 use crate::models::{self, Chosen, distance};
-use affine_atlas::flow::cones::{BoundaryCondition, ConeParams};
+use affine_atlas::flow::cones::{BoundaryCondition, ConeObjective, ConeParams};
 use std::f64::consts::PI;
 
 /// Flat faces: what bends the surface are the corners, and there is nothing left to distort.
-pub fn platonic() -> Result<(), String> {
+pub fn platonic(objective: ConeObjective) -> Result<(), String> {
     let mut failed = Vec::new();
     for (name, mut shape, levels, corners) in [
         ("tetrahedron", tetrahedron(), 4, 4),
@@ -21,6 +21,7 @@ pub fn platonic() -> Result<(), String> {
             for count in [corners, corners + 4] {
                 let params = ConeParams {
                     count: Some(count),
+                    objective,
                     ..ConeParams::default()
                 };
                 let (given, chosen) = models::choose(&mesh, &params, BoundaryCondition::Free)?;
@@ -45,7 +46,7 @@ pub fn platonic() -> Result<(), String> {
 
 /// A shape with one plane of symmetry, connectivity included: each cone has its mirror image among the cones, or the choice is better
 /// than both symmetric ones that half of it makes.
-pub fn mirror() -> Result<(), String> {
+pub fn mirror(objective: ConeObjective) -> Result<(), String> {
     let shape = bumps();
     let mesh = models::mesh(&shape);
     let c = &mesh.connectivity;
@@ -61,6 +62,7 @@ pub fn mirror() -> Result<(), String> {
     for count in [4, 5, 6, 8, 10, 12, 16] {
         let params = ConeParams {
             count: Some(count),
+            objective,
             ..ConeParams::default()
         };
         let (given, chosen) = models::choose(&mesh, &params, BoundaryCondition::Free)?;
@@ -73,9 +75,9 @@ pub fn mirror() -> Result<(), String> {
             let b = rest.remove(i);
             worst = (worst.0.max(far(b) / edge), worst.1.max((a.1 - b.1).abs()));
         }
-        let cost = models::distortion(&mesh, &given)?.cost.sqrt();
+        let cost = models::distortion(&mesh, &given)?.of(objective);
         println!(
-            "{count}: {} cones, images up to {:.2} edges off, curvatures {:.4}; {cost:.5}",
+            "{objective:?}, {count}: {} cones, images up to {:.2} edges off, curvatures {:.4}; {cost:.5}",
             chosen.len(),
             worst.0,
             worst.1
@@ -101,7 +103,7 @@ pub fn mirror() -> Result<(), String> {
             }
             let given = models::prescribe(&mesh, &both, BoundaryCondition::Free);
             let other = given.and_then(|given| models::distortion(&mesh, &given));
-            let Ok(other) = other.map(|d| d.cost.sqrt()) else {
+            let Ok(other) = other.map(|d| d.of(objective)) else {
                 continue;
             };
             println!(

@@ -46,6 +46,8 @@ pub struct Survey {
     pub id: String,
     /// The mesh as the user wrote it.
     pub given: String,
+    /// What the automatic choice made least.
+    pub objective: cones::ConeObjective,
     /// What the reader left out.
     pub notes: Vec<String>,
     /// In the order of their first face.
@@ -192,7 +194,7 @@ impl Task<'_> {
             rows,
             suggestion: None,
         };
-        survey.suggestion = suggestion::suggest(&survey);
+        survey.suggestion = suggestion::suggest(&survey, self.config.cones.objective);
         Ok(survey)
     }
 
@@ -377,6 +379,7 @@ pub fn run(
         let survey = Survey {
             id: id.to_owned(),
             given: given.to_owned(),
+            objective: config.cones.objective,
             notes: asset.notes,
             components: survey(&asset.soup, config, counts, observer)?,
         };

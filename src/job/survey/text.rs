@@ -156,6 +156,7 @@ impl Survey {
         json!({
             "id": self.id,
             "path": self.given,
+            "objective": self.objective,
             "notes": self.notes,
             "components": components,
         })
