@@ -1,8 +1,10 @@
 //! From the frame that a surface was worked on in back to source units.
 
 use super::AffineAtlas;
+use crate::atlas::patch::{Domain, Patch};
 use crate::atlas::plane::RigidMotion;
 use crate::geometry::frame::Frame;
+use crate::geometry::ids::PatchId;
 
 impl AffineAtlas {
     /// The same atlas in source units. Every length is multiplied by one power of two, so nothing but positions far from the origin is
@@ -39,23 +41,36 @@ impl AffineAtlas {
             motion(&mut gluing.motion);
             length(&mut gluing.residual);
         }
-        self.patches
-            .uv
-            .as_mut_slice()
-            .as_flattened_mut()
+        // Coordinates of a rectangle are shares of its width, whatever the units.
+        let has_units = |patch: &Patch| patch.domain() == Domain::Flat;
+        let units: Vec<bool> = self.patches.patches.iter().map(has_units).collect();
+        let side = |patch: PatchId, p: &mut [f64; 2]| {
+            if units[patch.index()] {
+                plane(p);
+            }
+        };
+        let of_face = self.patches.face_patch.iter();
+        for (&patch, uv) in of_face.zip(self.patches.uv.as_mut_slice()) {
+            uv.iter_mut().for_each(|p| side(patch, p));
+        }
+        for patch in self
+            .patches
+            .patches
             .iter_mut()
-            .for_each(plane);
-        for patch in &mut self.patches.patches {
+            .filter(|patch| has_units(patch))
+        {
             patch.texel_to_patch.iter_mut().flatten().for_each(length);
             patch.packed_scale /= frame.length(1.0);
             if let Some(to_chart) = &mut patch.to_chart {
                 to_chart.translation = frame.plane(to_chart.translation);
             }
         }
-        for sample in self.patches.seams.iter_mut().flat_map(|s| &mut s.samples) {
-            sample.position = frame.leave(sample.position);
-            plane(&mut sample.left);
-            plane(&mut sample.right);
+        for seam in &mut self.patches.seams {
+            for sample in &mut seam.samples {
+                sample.position = frame.leave(sample.position);
+                side(seam.left, &mut sample.left);
+                side(seam.right.unwrap_or(seam.left), &mut sample.right);
+            }
         }
         let one = |x: &mut f32| *x = frame.length(f64::from(*x)) as f32;
         let texels = self.images.iter_mut().flat_map(|image| &mut image.position);
