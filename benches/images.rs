@@ -11,6 +11,7 @@ use affine_atlas::atlas::geometry_image::{image_origin, sample};
 use affine_atlas::atlas::patches::{Domain, PatchLayout, PatchParams, charts_of};
 use affine_atlas::config::{self, Config};
 use affine_atlas::geometry::deviation::{Sampling, Triangles, deviation};
+use affine_atlas::geometry::frame::Frame;
 use affine_atlas::geometry::ids::{FaceVec, VertexVec};
 use affine_atlas::geometry::mesh::{AttributeKind, Mesh, Soup};
 use affine_atlas::rebuild::{Images, rebuild};
@@ -143,7 +144,7 @@ fn theirs(mesh: &Mesh, side: usize) -> Result<Found, Box<dyn Error>> {
         layout = charts_of(mesh, &uv, &params)?;
     }
     let log_scale = VertexVec::filled(0.0, mesh.connectivity.vertex_count());
-    let origin = image_origin(mesh);
+    let origin = image_origin(mesh, &Frame::default());
     let images = sample(mesh, &layout, &log_scale, origin);
     measure(mesh, &layout, &Images::new(&layout, &images, origin))
 }
@@ -181,5 +182,8 @@ fn component(file: &Path) -> Result<Mesh, Box<dyn Error>> {
 
 fn component_of(soup: &Soup) -> Result<Mesh, Box<dyn Error>> {
     let mut repaired = repair::repair(soup, &Default::default())?;
-    Ok(repaired.components.swap_remove(0).mesh?)
+    let component = repaired.components.swap_remove(0);
+    let mut mesh = component.mesh?;
+    component.frame.leave_all(&mut mesh.positions);
+    Ok(mesh)
 }

@@ -14,8 +14,11 @@ use std::fs;
 use std::io::{Cursor, Read, Write};
 use std::path::{Path, PathBuf};
 
+/// Reads whatever bytes it is given.
+pub type Target = fn(&[u8]);
+
 /// All targets by name.
-pub const TARGETS: [(&str, fn(&[u8])); 17] = [
+pub const TARGETS: [(&str, Target); 17] = [
     ("obj", |bytes| mesh("a.obj", bytes)),
     ("off", |bytes| mesh("a.off", bytes)),
     ("ply", |bytes| mesh("a.ply", bytes)),

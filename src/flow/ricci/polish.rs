@@ -32,7 +32,8 @@ pub(super) fn polish(
         let before = problem.max_error(now);
         problem.metric.evaluate(&next, &mut trial);
         // NaN is no progress either.
-        if !(problem.max_error(&trial) <= 0.5 * before) {
+        let is_better = problem.max_error(&trial) <= 0.5 * before;
+        if !is_better {
             // The trial may have flipped edges.
             problem.metric.evaluate(u, now);
             break;
