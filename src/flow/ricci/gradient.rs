@@ -12,7 +12,7 @@
 //!
 //! A flow converges (Definition 18) when K *and* γ do. |K − K̄| ≤ tolerance alone leaves u off by that over λ₁, which
 //! is large on large meshes. With λ₁ measured from the decay, the flow goes on until the remaining way in u is
-//! below `REMAINING_CHANGE`, or until rounding stops the decay. What is left then is taken by [`polish`]; it is not in the record.
+//! below `REMAINING_CHANGE`, or until rounding stops the decay. What is left then is taken by some steps of Newton (`polish`), which are not in the record.
 
 use super::error::FlowError;
 use super::polish::polish;
