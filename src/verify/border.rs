@@ -18,8 +18,8 @@ use std::f64::consts::{PI, TAU};
 /// Most pairs of edges that are compared, for each edge, and besides.
 const PAIRS: (u64, u64) = (2000, 10_000_000);
 
-/// Whether the border of a part of a slit disk is one simple closed curve, up to `tolerance` (a length). `None` where there are several borders, or
-/// where that cannot be told in bounded work. `inside` tells halfedges across which the part goes on.
+/// Whether the border of a part of a slit disk is one simple closed curve, up to `tolerance` (a length). `None` where there are several borders,
+/// where neighbours inside do not meet, or where that cannot be told in bounded work. `inside` tells halfedges across which the part goes on.
 pub(super) fn is_simple(
     surface: &Surface<'_>,
     arrays: &Arrays,
@@ -32,11 +32,19 @@ pub(super) fn is_simple(
             .iter()
             .flat_map(|f| 3 * *f as usize..3 * *f as usize + 3)
     };
+    let at = |corner| at_corner(&arrays.patch_uv, corner);
+    let meets = |h: usize| {
+        surface.twin(h).is_some_and(|t| {
+            let (a, b) = (surface.tail_corner(h), surface.head_corner(t));
+            distance2(at(a), at(b)) <= tolerance
+        })
+    };
+    if !halfedges().all(|h| !inside(h) || meets(h)) {
+        return None;
+    }
     let border: Vec<usize> = halfedges().filter(|h| !inside(*h)).collect();
-    let path = around(surface, &border, &inside)?;
-    let points: Vec<Point2> = (path.iter())
-        .map(|h| at_corner(&arrays.patch_uv, surface.tail_corner(*h)))
-        .collect();
+    let path = around(surface, &border, &inside, 3 * faces.len())?;
+    let points: Vec<Point2> = (path.iter()).map(|h| at(surface.tail_corner(*h))).collect();
     if (turning(&points) - TAU).abs() > PI {
         return Some(false);
     }
@@ -46,17 +54,21 @@ pub(super) fn is_simple(
     crosses(&edges, tolerance).map(|crosses| !crosses)
 }
 
-/// The border from its first halfedge on; `None` where it is not one closed path.
+/// The border from its first halfedge on; `None` where it is not one closed path. Every halfedge is passed once, unless the two sides of an
+/// edge tell different things of it: `most` halfedges are.
 fn around(
     surface: &Surface<'_>,
     border: &[usize],
     inside: &impl Fn(usize) -> bool,
+    most: usize,
 ) -> Option<Vec<usize>> {
     let first = *border.first()?;
     let mut path = vec![first];
+    let mut left = most;
     loop {
         let mut h = surface.next(*path.last()?);
         while inside(h) {
+            left = left.checked_sub(1)?;
             h = surface.next(surface.twin(h)?);
         }
         if h == first {

@@ -65,7 +65,10 @@ pub fn mutations() -> Vec<Mutation> {
             |a| {
                 let mut patch = a.json["patches"][0].clone();
                 patch["id"] = json!(2);
+                patch["image"] = json!("images/0002.exr");
                 append(a, "patches", patch);
+                let picture = a.pictures[0].clone();
+                a.pictures.push(picture);
             },
             [
                 "every patch has faces",
