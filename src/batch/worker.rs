@@ -15,6 +15,7 @@ use crate::read;
 use serde::{Deserialize, Serialize};
 use std::io::{self, BufRead, Read, Write};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -94,11 +95,15 @@ pub fn receive() -> io::Result<Job> {
         .spawn(move || {
             // Nothing is ever sent: reading ends when the other side does.
             let _ = io::copy(&mut input.by_ref(), &mut io::sink());
+            ENDING.store(true, Ordering::SeqCst);
             remove_all_staging();
             std::process::exit(130);
         })?;
     Ok(job)
 }
+
+/// The lifeline has ended: staging folders vanish under the job, whose outcome is of no interest any more.
+static ENDING: AtomicBool = AtomicBool::new(false);
 
 /// Says something. Where nobody listens any more the lifeline ends this process.
 pub fn send(event: &Event) {
@@ -119,6 +124,10 @@ pub fn work(job: &Job, path: &Path, output: &Path) -> AssetOutcome {
     let before = read::fingerprint(path).ok();
     let told = Told::new(job);
     let mut outcome = job::run(path, &job.given, output, &job.id, &config, &told);
+    while ENDING.load(Ordering::SeqCst) {
+        // What failed may have failed because its files were removed. The lifeline ends this process.
+        std::thread::park();
+    }
     told.leave();
     outcome.look_for_older(output);
     outcome.peak_memory = limits::peak_memory();
