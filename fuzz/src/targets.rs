@@ -5,7 +5,9 @@ use affine_atlas::batch::plan::Plan;
 use affine_atlas::config;
 use affine_atlas::export::manifest::Manifest;
 use affine_atlas::flow::cones;
-use affine_atlas::read::{ReadParams, atlas, fingerprint, flat, metric, read_bytes};
+use affine_atlas::read::{
+    ReadError, ReadParams, SourceAsset, atlas, fingerprint, flat, metric, read, read_bytes,
+};
 use affine_atlas::texture::Exemplar;
 use affine_atlas::verify::{VerifyOptions, verify};
 use serde_json::{Value, json};
@@ -13,6 +15,8 @@ use std::cell::RefCell;
 use std::fs;
 use std::io::{Cursor, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+use std::thread::LocalKey;
 
 /// Reads whatever bytes it is given.
 pub type Target = fn(&[u8]);
@@ -38,14 +42,20 @@ pub const TARGETS: [(&str, Target); 17] = [
     ("verify", verify_folder),
 ];
 
-/// A mesh in memory, and what the reader promises of it.
+const LIMITS: ReadParams = ReadParams {
+    max_vertices: 20_000,
+    max_faces: 20_000,
+    max_file_bytes: 8 << 20,
+};
+
+/// A mesh in memory.
 fn mesh(name: &str, bytes: &[u8]) {
-    let params = ReadParams {
-        max_vertices: 20_000,
-        max_faces: 20_000,
-        max_file_bytes: 8 << 20,
-    };
-    match read_bytes(Path::new(name), bytes, &params) {
+    promised(read_bytes(Path::new(name), bytes, &LIMITS));
+}
+
+/// What the reader promises of a mesh, or of its refusal.
+fn promised(read: Result<SourceAsset, ReadError>) {
+    match read {
         Ok(asset) => {
             let soup = &asset.soup;
             let count = soup.positions.len();
@@ -69,10 +79,14 @@ fn mesh(name: &str, bytes: &[u8]) {
 
 /// A glTF file in a folder, with the files it refers to.
 fn gltf(bytes: &[u8]) {
-    mesh("a.gltf", bytes);
-    with_folder(|folder| {
+    in_folder(&SMALL, |folder| {
         let path = folder.put("a.gltf", bytes);
-        let _ = fingerprint(&path);
+        let found = fingerprint(&path).expect("a file");
+        let asset = read(&path, &LIMITS);
+        if let Ok(asset) = &asset {
+            assert!(asset.files.iter().all(|file| found.files.contains(file)));
+        }
+        promised(asset);
     });
 }
 
@@ -174,7 +188,7 @@ fn pattern(bytes: &[u8]) {
     if side_of(bytes) > 512 {
         return;
     }
-    with_folder(|folder| {
+    in_folder(&SMALL, |folder| {
         let path = folder.put("pattern", bytes);
         if let Ok(image) = Exemplar::read(&path) {
             let _ = (image.border(), image.symmetry(), image.is_transparent());
@@ -202,7 +216,7 @@ fn side_of(bytes: &[u8]) -> u64 {
 
 /// One image of a folder that is whole but for it.
 fn exr(bytes: &[u8]) {
-    with_folder(|folder| {
+    in_folder(&SMALL, |folder| {
         folder.put("images/0000.exr", bytes);
         let _ = atlas::read_images(&folder.path);
     });
@@ -210,7 +224,7 @@ fn exr(bytes: &[u8]) {
 
 /// The arrays of a folder that is whole but for them.
 fn npz(bytes: &[u8]) {
-    with_folder(|folder| {
+    in_folder(&SMALL, |folder| {
         folder.put("atlas.npz", bytes);
         if let Ok(surface) = atlas::read_surface(&folder.path) {
             let count = surface.positions.len();
@@ -224,12 +238,13 @@ fn npz(bytes: &[u8]) {
         }
         let _ = metric::read_metric(&folder.path);
         let _ = flat::read_flat(&folder.path);
+        let _ = atlas::read_images(&folder.path);
     });
 }
 
 /// The description of a folder that is whole but for it.
 fn atlas_json(bytes: &[u8]) {
-    with_folder(|folder| {
+    in_folder(&SMALL, |folder| {
         folder.put("atlas.json", bytes);
         let _ = atlas::read_images(&folder.path);
         let _ = metric::read_metric(&folder.path);
@@ -266,7 +281,7 @@ fn cone_file(bytes: &[u8]) {
 }
 
 fn plan(bytes: &[u8]) {
-    with_folder(|folder| {
+    in_folder(&SMALL, |folder| {
         let path = folder.put("plan.jsonl", bytes);
         let _ = Plan::read(&path);
         // Most plans have a wrong hash; this one's is right.
@@ -299,7 +314,7 @@ fn with_hash(bytes: &[u8]) -> Vec<u8> {
 }
 
 fn manifest(bytes: &[u8]) {
-    with_folder(|folder| {
+    in_folder(&WHOLE, |folder| {
         folder.put("manifest.jsonl", bytes);
         if let Ok((manifest, _)) = Manifest::load(&folder.path) {
             assert!(manifest.records().len() <= bytes.len());
@@ -311,71 +326,90 @@ fn manifest(bytes: &[u8]) {
 /// Edits of the files of a whole folder: each two bytes that choose a file, two that choose a place in it, and one that says how many
 /// of the bytes behind it (up to 15) take the place of those there. Arrays are edited unpacked and packed again.
 fn verify_folder(bytes: &[u8]) {
-    with_folder(|folder| {
-        let mut json = JSON.to_vec();
-        let mut glb = GLB.to_vec();
-        let mut images = IMAGES.map(|(_, image)| image.to_vec());
-        let mut arrays = arrays_of(NPZ);
+    static UNPACKED: LazyLock<Vec<(String, Vec<u8>)>> = LazyLock::new(|| arrays_of(NPZ));
+    in_folder(&WHOLE, |folder| {
+        let mut files: Vec<(&str, Vec<u8>)> = PLAIN
+            .iter()
+            .map(|&(name, bytes)| (name, bytes.to_vec()))
+            .collect();
+        let mut arrays = UNPACKED.clone();
+        let mut edited = vec![false; files.len() + 1];
         let mut rest = bytes;
         while let Some((&[file, low, high, count], after)) = rest.split_first_chunk() {
             let count = usize::from(count % 16).min(after.len());
             let (new, after) = after.split_at(count);
             rest = after;
-            let file = usize::from(file) % (2 + images.len() + arrays.len());
-            let old = match file {
-                0 => &mut json,
-                1 => &mut glb,
-                _ if file < 2 + images.len() => &mut images[file - 2],
-                _ => &mut arrays[file - 2 - images.len()].1,
+            let plain = files.len();
+            let file = usize::from(file) % (plain + arrays.len());
+            let old = match file < plain {
+                true => &mut files[file].1,
+                false => &mut arrays[file - plain].1,
             };
             let at = usize::from(u16::from_le_bytes([low, high])) % old.len();
             let end = (at + count).min(old.len());
             old[at..end].copy_from_slice(&new[..end - at]);
+            edited[file.min(plain)] = true;
         }
-        folder.put("atlas.json", &json);
-        folder.put("surface.glb", &glb);
-        for ((name, _), image) in IMAGES.iter().zip(&images) {
-            folder.put(name, image);
+        for ((name, bytes), _) in files.iter().zip(&edited).filter(|(_, edited)| **edited) {
+            folder.put(name, bytes);
         }
-        folder.put("atlas.npz", &zipped(&arrays));
+        if edited[files.len()] {
+            folder.put("atlas.npz", &zipped(&arrays));
+        }
         let verdicts = verify(&folder.path, &VerifyOptions::default());
         assert!(!verdicts.expect("a folder").checks.is_empty());
     });
 }
 
-// ---- a whole folder
+// ---- whole folders
 
-const JSON: &[u8] = include_bytes!("../folder/atlas.json");
+/// Names of files and what they hold.
+type Files = [(&'static str, &'static [u8])];
+
+macro_rules! file {
+    ($folder:literal, $name:literal) => {
+        ($name, include_bytes!(concat!("../", $folder, "/", $name)))
+    };
+}
+
 const NPZ: &[u8] = include_bytes!("../folder/atlas.npz");
-const GLB: &[u8] = include_bytes!("../folder/surface.glb");
-const IMAGES: [(&str, &[u8]); 4] = [
-    (
-        "images/0000.exr",
-        include_bytes!("../folder/images/0000.exr"),
-    ),
-    (
-        "images/0001.exr",
-        include_bytes!("../folder/images/0001.exr"),
-    ),
-    (
-        "images/0002.exr",
-        include_bytes!("../folder/images/0002.exr"),
-    ),
-    (
-        "images/0003.exr",
-        include_bytes!("../folder/images/0003.exr"),
-    ),
+
+/// What a build wrote of a tetrahedron, without its arrays.
+const PLAIN: &Files = &[
+    file!("folder", "atlas.json"),
+    file!("folder", "surface.glb"),
+    file!("folder", "images/0000.exr"),
+    file!("folder", "images/0001.exr"),
+    file!("folder", "images/0002.exr"),
+    file!("folder", "images/0003.exr"),
 ];
+
+const ARRAYS: &Files = &[("atlas.npz", NPZ)];
+
+/// As little as the readers take: one patch of 8 by 8 texels, so that most of the time goes to the file that is fuzzed. And a file that a
+/// glTF file may refer to.
+const LITTLE: &Files = &[
+    file!("small", "atlas.json"),
+    file!("small", "atlas.npz"),
+    file!("small", "images/0000.exr"),
+    file!("small", "square.bin"),
+];
+
+thread_local! {
+    static WHOLE: RefCell<Folder> = RefCell::new(Folder::new(&[PLAIN, ARRAYS].concat()));
+    static SMALL: RefCell<Folder> = RefCell::new(Folder::new(LITTLE));
+}
 
 /// A folder that holds a whole atlas, of which a target replaces files.
 struct Folder {
     path: PathBuf,
+    whole: Vec<(&'static str, &'static [u8])>,
     replaced: Vec<String>,
     _removed_at_the_end: tempfile::TempDir,
 }
 
 impl Folder {
-    fn new() -> Self {
+    fn new(files: &Files) -> Self {
         // In memory where the system has such a place.
         let memory = Path::new("/dev/shm");
         let folder = match memory.is_dir() {
@@ -386,12 +420,10 @@ impl Folder {
         fs::create_dir(folder.path().join("images")).expect("a folder");
         let mut whole = Self {
             path: folder.path().to_owned(),
-            replaced: Vec::new(),
+            whole: files.to_vec(),
+            replaced: files.iter().map(|(name, _)| (*name).to_owned()).collect(),
             _removed_at_the_end: folder,
         };
-        for (name, _) in whole_files() {
-            whole.replaced.push(name.to_owned());
-        }
         whole.restore();
         whole
     }
@@ -408,7 +440,7 @@ impl Folder {
     fn restore(&mut self) {
         for name in std::mem::take(&mut self.replaced) {
             let path = self.path.join(&name);
-            match whole_files().find(|(known, _)| *known == name) {
+            match self.whole.iter().find(|(known, _)| *known == name) {
                 Some((_, bytes)) => fs::write(path, bytes).expect("written"),
                 None => fs::remove_file(path).expect("removed"),
             }
@@ -416,21 +448,8 @@ impl Folder {
     }
 }
 
-fn whole_files() -> impl Iterator<Item = (&'static str, &'static [u8])> {
-    [
-        ("atlas.json", JSON),
-        ("atlas.npz", NPZ),
-        ("surface.glb", GLB),
-    ]
-    .into_iter()
-    .chain(IMAGES)
-}
-
-fn with_folder(run: impl FnOnce(&mut Folder)) {
-    thread_local! {
-        static FOLDER: RefCell<Folder> = RefCell::new(Folder::new());
-    }
-    FOLDER.with_borrow_mut(|folder| {
+fn in_folder(folder: &'static LocalKey<RefCell<Folder>>, run: impl FnOnce(&mut Folder)) {
+    folder.with_borrow_mut(|folder| {
         run(folder);
         folder.restore();
     });
