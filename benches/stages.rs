@@ -40,6 +40,7 @@ impl Observer for Stopwatch {
 /// One mesh of a table.
 struct Level {
     vertices: usize,
+    faces: usize,
     stages: Vec<Stage>,
 }
 
@@ -89,6 +90,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             for _ in 0..arguments.runs {
                 let level = Level {
                     vertices: triangles.positions.len(),
+                    faces: triangles.faces.len(),
                     stages: measure(path)?,
                 };
                 if best
@@ -126,6 +128,10 @@ fn print_stages(name: &str, level: &Level) {
             stage.peak
         );
     }
+    println!(
+        "  verification: {:.2} microseconds a face",
+        1e6 * level.seconds(&["verify"]) / level.faces as f64
+    );
 }
 
 /// A column a level, and below how each row grows: the exponent of the vertex count from the level before.
@@ -151,6 +157,10 @@ fn print_table(name: &str, levels: &[Level]) {
             each(&|l| format!("{:.0} MiB", l.peak(stage))),
         );
     }
+    row(
+        "verify, microseconds a face",
+        each(&|l| format!("{:.2}", 1e6 * l.seconds(&["verify"]) / l.faces as f64)),
+    );
     let ratio = |l: &Level| l.seconds(&AFTER_FLOW) / l.seconds(&["flow"]);
     row(
         "(overlay + cut + charts) / flow",
