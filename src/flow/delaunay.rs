@@ -26,6 +26,11 @@ use std::f64::consts::PI;
 /// By how much θ_k + θ_m may exceed π (or cos θ_k + cos θ_m fall below 0) before an edge is flipped, radians: above the
 /// rounding of angles, far below what a step of the flow could feel.
 const SLACK: f64 = 1e-12;
+/// Units in the last place of lengths that angles may be wrong by, and what they come to in a needle: an angle of a face turns by as much of a
+/// radian as the face's least angle has it longer than wide.
+const LENGTH_ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// The slack never exceeds this, however thin a face is.
+const MOST_SLACK: f64 = 1e-9;
 /// Factor on the slack for every time that the edge was flipped already at this `u`: rounding may make both
 /// diagonals of a nearly cocircular quad look wrong, and this ends the quarrel.
 const SLACK_GROWTH: f64 = 4.0;
@@ -222,8 +227,17 @@ impl Delaunay {
             cosine(h) + cosine(t) < -slack
         } else {
             let angle = |h: HalfedgeId| shape[c.face(h)].angle[(c.corner(h) + 2) % 3];
-            angle(h) + angle(t) > PI + slack
+            let sum = angle(h) + angle(t);
+            sum > PI + slack && sum > PI + slack.max(self.rounding(shape, [f, g]))
         }
+    }
+
+    /// What the lengths of two faces leave open of their angles. Corners of a regular polygon are cocircular, and the faces of a fan over it so thin that
+    /// rounding would flip every edge, some of them over and over.
+    fn rounding(&self, shape: &FaceVec<FaceShape>, faces: [FaceId; 2]) -> f64 {
+        let angles = faces.iter().flat_map(|f| shape[*f].angle);
+        let least = angles.fold(f64::INFINITY, f64::min);
+        (LENGTH_ROUNDING / least).min(MOST_SLACK)
     }
 
     /// ln of the length of the other diagonal; `None` where it has none.
@@ -421,6 +435,27 @@ mod tests {
             assert_delaunay(&delaunay, &VertexVec::filled(0.0, c.vertex_count()));
         }
         assert!(flips > 20);
+    }
+
+    /// All its corners lie on a circle, so any triangulation of it is Delaunay; rounding must not choose another one for faces that are thin.
+    #[test]
+    fn the_fan_of_a_regular_polygon_stays() {
+        for corners in [500, 4000, 60_000] {
+            let at = |i: usize| {
+                let (s, c) = (std::f64::consts::TAU * i as f64 / corners as f64).sin_cos();
+                [c, s, 0.0]
+            };
+            let faces: Vec<[u32; 3]> = (2..corners as u32).map(|i| [0, i - 1, i]).collect();
+            let c = Connectivity::from_faces(&faces, corners).unwrap();
+            let length = c.edges().map(|e| {
+                let [a, b] = c.edge_vertices(e).map(|v| at(v.index()));
+                crate::geometry::mesh::distance(a, b)
+            });
+            let length: EdgeVec<f64> = length.collect();
+            let mut delaunay = Delaunay::new(c, &length, Vec::new());
+            delaunay.flip_in_the_surface();
+            assert_eq!(delaunay.flips, 0, "{corners}");
+        }
     }
 
     #[test]

@@ -1,10 +1,11 @@
-//! Surfaces: ids, connectivity, positions, and formulas on single triangles.
+//! Surfaces: ids, connectivity, positions, and formulas on single triangles and polygons.
 pub mod connectivity;
 pub mod deviation;
 pub(crate) mod disjoint_sets;
 pub mod frame;
 pub mod ids;
 pub mod mesh;
+pub(crate) mod polygon;
 pub mod triangle;
 
 #[cfg(test)]

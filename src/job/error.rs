@@ -70,7 +70,7 @@ pub enum BuildError {
 /// An atlas that does not pass [`verify`](crate::verify): the checks that failed, with their figures.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the atlas did not pass {} of its {checks} checks and was not published ({}); mend what `affine-atlas explain` shows of the mesh (very thin faces, coordinates without digits), or ask for weaker or more cones",
+    "the atlas did not pass {} of its {checks} checks and was not published ({}); mend what `affine-atlas explain` shows of the mesh (very thin faces, vertices that nearly coincide; repair.weld_tolerance merges such ones on open borders), or ask for weaker or more cones",
     failed.len(),
     listed(failed)
 )]
@@ -128,6 +128,7 @@ impl BuildError {
             BuildError::Flow(FlowError::GaussBonnet { .. }) => FailureKind::Prescription,
             BuildError::Flow(FlowError::BadLength { .. }) => FailureKind::Input,
             BuildError::Flow(_) | BuildError::Develop(_) => FailureKind::NotConverged,
+            BuildError::Overlay(OverlayError::TooManyCrossings { .. }) => FailureKind::Input,
             BuildError::Overlay(_) => FailureKind::Internal,
             BuildError::Cut(CutError::NothingToCutAlong) => FailureKind::Prescription,
             BuildError::Cut(_) => FailureKind::Internal,

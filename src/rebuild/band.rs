@@ -10,11 +10,12 @@
 //! but for the width by which a border that touches itself is opened.
 
 use super::chain::Polygon;
-use super::crossing::{cells_along, crossings, is_counterclockwise};
+use super::crossing::{cells_along, crossings};
 use super::frame::Frame;
 use super::{PatchImage, RebuildError};
 use crate::atlas::plane::{distance, rotate};
 use crate::geometry::mesh::{self, distance_to_segment};
+use crate::geometry::polygon::is_counterclockwise;
 use rustc_hash::FxHashMap;
 use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation, mitigate_underflow};

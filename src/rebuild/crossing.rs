@@ -1,17 +1,7 @@
 //! Where a closed polygon crosses or touches itself, by exact predicates.
 
-use robust::{Coord, orient2d};
+use crate::geometry::polygon::meet;
 use rustc_hash::FxHashMap;
-
-fn coord(p: [f64; 2]) -> Coord<f64> {
-    Coord { x: p[0], y: p[1] }
-}
-
-/// Sign of the area of a triangle, exactly.
-fn orientation(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> i8 {
-    let area = orient2d(coord(a), coord(b), coord(c));
-    i8::from(area > 0.0) - i8::from(area < 0.0)
-}
 
 /// Pairs of edges (edge i runs from vertex i to the next) that meet anywhere but at the vertex they share, ascending. `texel` are the
 /// vertices in units of about an edge, for the search only.
@@ -39,19 +29,6 @@ pub(super) fn crossings(polygon: &[[f64; 2]], texel: &[[f64; 2]]) -> Vec<[usize;
     found
 }
 
-/// True where a polygon that does not cross itself runs counterclockwise.
-pub(super) fn is_counterclockwise(polygon: &[[f64; 2]]) -> bool {
-    let n = polygon.len();
-    let key = |&i: &usize| (polygon[i][0], polygon[i][1]);
-    let lowest = (0..n).min_by(|a, b| {
-        let (a, b) = (key(a), key(b));
-        a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
-    });
-    lowest.is_some_and(|i| {
-        orientation(polygon[(i + n - 1) % n], polygon[i], polygon[(i + 1) % n]) > 0
-    })
-}
-
 /// Unit cells that a segment passes within a millionth, and some more.
 pub(super) fn cells_along(a: [f64; 2], b: [f64; 2]) -> impl Iterator<Item = [i64; 2]> {
     const WIDER: f64 = 1e-6;
@@ -75,30 +52,6 @@ pub(super) fn cells_along(a: [f64; 2], b: [f64; 2]) -> impl Iterator<Item = [i64
     })
 }
 
-fn meet(polygon: &[[f64; 2]], [i, j]: [usize; 2]) -> bool {
-    let n = polygon.len();
-    let at = |i: usize| polygon[i % n];
-    if j == i + 1 {
-        return folds(at(i), at(j), at(j + 1));
-    }
-    if i == 0 && j == n - 1 {
-        return folds(at(j), at(0), at(1));
-    }
-    let (a, b, c, d) = (at(i), at(i + 1), at(j), at(j + 1));
-    let apart = |k: usize| a[k].max(b[k]) < c[k].min(d[k]) || c[k].max(d[k]) < a[k].min(b[k]);
-    if apart(0) || apart(1) {
-        return false;
-    }
-    orientation(a, b, c) * orientation(a, b, d) <= 0
-        && orientation(c, d, a) * orientation(c, d, b) <= 0
-}
-
-/// Whether the edges a–b and b–c have more in common than b.
-fn folds(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> bool {
-    let dot = (a[0] - b[0]) * (c[0] - b[0]) + (a[1] - b[1]) * (c[1] - b[1]);
-    a == b || b == c || (dot > 0.0 && orientation(a, b, c) == 0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -113,9 +66,6 @@ mod tests {
     fn simple_polygons_have_none() {
         let square = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]];
         assert!(crossings(&square, &square).is_empty());
-        assert!(is_counterclockwise(&square));
-        let turned: Vec<_> = square.into_iter().rev().collect();
-        assert!(!is_counterclockwise(&turned));
     }
 
     #[test]

@@ -12,9 +12,10 @@
 use super::RebuildError;
 use super::border::Borders;
 use super::chain::{Chain, Point, polygon};
-use super::crossing::{crossings, is_counterclockwise};
+use super::crossing::crossings;
 use super::frame::Frame;
 use crate::atlas::patches::Seam;
+use crate::geometry::polygon::is_counterclockwise;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 

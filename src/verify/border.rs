@@ -1,32 +1,32 @@
-//! Whether the border of a patch crosses itself: another way to see that no two of its faces overlap.
+//! Whether the border of a patch keeps away from itself: another way to see that no two of its faces overlap.
 //!
 //! A disk whose faces are all counterclockwise covers a point of the plane as often as its border winds around that point. So where the
 //! border is one simple closed curve, every point is covered once at most. This takes the border's edges alone, which are few; and patches of
 //! long faces that all meet in one point, where every pair of faces would have to be looked at, have a short one. A part of a slit disk that
 //! has one border is a disk.
 //!
-//! *Not guaranteed:* that a border which only touches itself, to the tolerance, is told from one that crosses itself there; its turning
-//! number, which must be 1, tells most of these.
+//! *Guaranteed:* a border is called simple only where edges that are no neighbours are further apart than the tolerance: sheets that overlap exactly along the
+//! lines of a grid cross in corners alone, which looks like touching. *Not guaranteed:* that every simple border is recognised.
+//! The stage that makes patches asks the same question of exact predicates in code of its own.
 
 use super::arrays::Arrays;
 use super::central::at_corner;
 use super::formulas::{Point2, distance2, sub2};
 use super::grid::Grid;
 use super::surface::Surface;
-use std::f64::consts::{PI, TAU};
 
 /// Most pairs of edges that are compared, for each edge, and besides.
 const PAIRS: (u64, u64) = (2000, 10_000_000);
 
-/// Whether the border of a part of a slit disk is one simple closed curve, up to `tolerance` (a length). `None` where there are several borders,
-/// where neighbours inside do not meet, or where that cannot be told in bounded work. `inside` tells halfedges across which the part goes on.
+/// True where the border of a part of a slit disk is one closed curve that stays away from itself by more than `tolerance` (a length). False where there are
+/// several borders, where neighbours inside do not meet, or where that cannot be told in bounded work. `inside` tells halfedges across which the part goes on.
 pub(super) fn is_simple(
     surface: &Surface<'_>,
     arrays: &Arrays,
     faces: &[u32],
     inside: impl Fn(usize) -> bool,
     tolerance: f64,
-) -> Option<bool> {
+) -> bool {
     let halfedges = || {
         faces
             .iter()
@@ -40,18 +40,14 @@ pub(super) fn is_simple(
         })
     };
     if !halfedges().all(|h| !inside(h) || meets(h)) {
-        return None;
+        return false;
     }
     let border: Vec<usize> = halfedges().filter(|h| !inside(*h)).collect();
-    let path = around(surface, &border, &inside, 3 * faces.len())?;
+    let Some(path) = around(surface, &border, &inside, 3 * faces.len()) else {
+        return false;
+    };
     let points: Vec<Point2> = (path.iter()).map(|h| at(surface.tail_corner(*h))).collect();
-    if (turning(&points) - TAU).abs() > PI {
-        return Some(false);
-    }
-    let edges: Vec<[Point2; 2]> = (0..points.len())
-        .map(|i| [points[i], points[(i + 1) % points.len()]])
-        .collect();
-    crosses(&edges, tolerance).map(|crosses| !crosses)
+    keeps_away(&points, tolerance)
 }
 
 /// The border from its first halfedge on; `None` where it is not one closed path. Every halfedge is passed once, unless the two sides of an
@@ -81,71 +77,128 @@ fn around(
     }
 }
 
-/// The sum of exterior angles of a polygon, radians: 2π times its turning number.
-fn turning(points: &[Point2]) -> f64 {
+/// Whether the edges of a closed polygon are further than `tolerance` from each other, but for neighbours near their common corner; false where too many lie
+/// near each other.
+fn keeps_away(points: &[Point2], tolerance: f64) -> bool {
+    if !points.iter().flatten().all(|x| x.is_finite()) {
+        return false;
+    }
     let n = points.len();
-    let directions = (0..n).map(|i| sub2(points[(i + 1) % n], points[i]));
-    let directions: Vec<Point2> = directions.filter(|d| *d != [0.0; 2]).collect();
-    let n = directions.len();
-    let angle = |i: usize| {
-        let (a, b) = (directions[i], directions[(i + 1) % n]);
-        (a[0] * b[1] - a[1] * b[0]).atan2(a[0] * b[0] + a[1] * b[1])
+    let edge = |i: usize| [points[i], points[(i + 1) % n]];
+    let edges: Vec<[Point2; 2]> = (0..n).map(edge).collect();
+    let limit = 256 * n + 100_000;
+    let Ok(grid) = Grid::new(&edges, tolerance, limit) else {
+        return false;
     };
-    (0..n).map(angle).sum()
-}
-
-/// Whether two edges cross, each having the ends of the other on either side by more than `tolerance`; `None` where there are too many near each other.
-fn crosses(edges: &[[Point2; 2]], tolerance: f64) -> Option<bool> {
-    let limit = 256 * edges.len() + 100_000;
-    let grid = Grid::new(edges, tolerance, limit).ok()?;
     let in_cell = |cell| grid.cell_items(cell);
     let pairs: u64 = (0..grid.cells())
         .map(|cell| (in_cell(cell).len() as u64).pow(2))
         .sum();
-    if pairs > PAIRS.0 * edges.len() as u64 + PAIRS.1 {
-        return None;
+    if pairs > PAIRS.0 * n as u64 + PAIRS.1 {
+        return false;
     }
-    let side = |[p, q]: [Point2; 2], r: Point2| {
-        let (d, e) = (sub2(q, p), sub2(r, p));
-        let height = (d[0] * e[1] - d[1] * e[0]) / distance2(p, q);
-        i32::from(height > tolerance) - i32::from(height < -tolerance)
+    let meet = |a: usize, b: usize| {
+        let (first, second) = (a.min(b), a.max(b));
+        if second == first + 1 {
+            neighbours_meet(edges[first], edges[second], tolerance)
+        } else if first == 0 && second == n - 1 {
+            neighbours_meet(edges[second], edges[first], tolerance)
+        } else {
+            edges_meet(edges[first], edges[second], tolerance)
+        }
     };
-    let apart = |a: [Point2; 2], b: [Point2; 2]| side(a, b[0]) * side(a, b[1]) >= 0;
-    let crossing = (0..grid.cells()).any(|cell| {
-        let items = in_cell(cell);
-        items.iter().enumerate().any(|(i, a)| {
-            items[i + 1..].iter().any(|b| {
-                let (a, b) = (edges[*a as usize], edges[*b as usize]);
-                !(apart(a, b) || apart(b, a))
+    n > 2
+        && (0..grid.cells()).all(|cell| {
+            let items = in_cell(cell);
+            items.iter().enumerate().all(|(i, a)| {
+                let mut others = items[i + 1..].iter();
+                !others.any(|b| meet(*a as usize, *b as usize))
             })
         })
-    });
-    Some(crossing)
+}
+
+/// Whether two edges cross or come this near.
+fn edges_meet(a: [Point2; 2], b: [Point2; 2], tolerance: f64) -> bool {
+    let side = |[p, q]: [Point2; 2], r: Point2| {
+        let (d, e) = (sub2(q, p), sub2(r, p));
+        d[0] * e[1] - d[1] * e[0]
+    };
+    let divides = |a, b: [Point2; 2]| (side(a, b[0]) < 0.0) != (side(a, b[1]) < 0.0);
+    let near = |a, b: [Point2; 2]| b.iter().any(|p| is_near(*p, a, tolerance));
+    divides(a, b) && divides(b, a) || near(a, b) || near(b, a)
+}
+
+/// Whether two edges, of which one begins where the other ends, come this near away from there.
+fn neighbours_meet(a: [Point2; 2], b: [Point2; 2], tolerance: f64) -> bool {
+    is_near(a[0], b, tolerance) || is_near(b[1], a, tolerance)
+}
+
+fn is_near(r: Point2, [p, q]: [Point2; 2], tolerance: f64) -> bool {
+    let (d, e) = (sub2(q, p), sub2(r, p));
+    let along = (d[0] * e[0] + d[1] * e[1]) / (d[0] * d[0] + d[1] * d[1]);
+    // An edge without length is its end.
+    let t = if along > 0.0 { along.min(1.0) } else { 0.0 };
+    distance2(r, [p[0] + t * d[0], p[1] + t * d[1]]) <= tolerance
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn polygon(points: &[Point2]) -> Vec<[Point2; 2]> {
-        (0..points.len())
-            .map(|i| [points[i], points[(i + 1) % points.len()]])
-            .collect()
-    }
+    use std::f64::consts::TAU;
 
     #[test]
-    fn a_bow_tie_crosses_itself_and_a_notched_square_does_not() {
+    fn what_crosses_or_touches_itself_does_not_keep_away() {
+        let square = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
         let tie = [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];
-        assert_eq!(crosses(&polygon(&tie), 1e-9), Some(true));
-        assert!(turning(&tie).abs() < 1e-12);
-        let notched = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [1.0, 0.0], [0.0, 2.0]];
-        // The notch touches the lower side.
-        assert_eq!(crosses(&polygon(&notched), 1e-9), Some(false));
-        assert!((turning(&notched) - TAU).abs() < 1e-12);
+        let notched = |y: f64| [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [1.0, y], [0.0, 2.0]];
+        let back = [[0.0, 0.0], [2.0, 0.0], [1.0, 0.0], [1.0, 1.0]];
+        assert!(keeps_away(&square, 1e-9));
+        assert!(!keeps_away(&tie, 1e-9));
+        assert!(keeps_away(&notched(1e-8), 1e-9));
+        assert!(!keeps_away(&notched(1e-10), 1e-9));
+        assert!(!keeps_away(&back, 1e-9));
+        assert!(!keeps_away(&[[f64::NAN; 2]; 4], 1e-9));
+    }
+
+    /// Its turning number is that of a simple curve, and it crosses itself in corners alone.
+    #[test]
+    fn a_strip_that_crosses_its_beginning_along_a_grid_is_found() {
+        let turns: [[u32; 2]; 10] = [
+            [0, 1],
+            [5, 1],
+            [5, 6],
+            [2, 6],
+            [2, 0],
+            [3, 0],
+            [3, 5],
+            [4, 5],
+            [4, 2],
+            [0, 2],
+        ];
+        let mut points: Vec<Point2> = Vec::new();
+        for (i, from) in turns.iter().enumerate() {
+            let to = turns[(i + 1) % turns.len()];
+            let steps = from[0].abs_diff(to[0]) + from[1].abs_diff(to[1]);
+            for k in 0..steps {
+                let part = f64::from(k) / f64::from(steps);
+                points.push([0, 1].map(|i| {
+                    let [a, b] = [from[i], to[i]].map(|x: u32| f64::from(x));
+                    (a + part * (b - a)).round()
+                }));
+            }
+        }
+        let n = points.len();
+        let turn = |i: usize| {
+            let [p, q, r] = [0, 1, 2].map(|k| points[(i + k) % n]);
+            let (a, b) = (sub2(q, p), sub2(r, q));
+            (a[0] * b[1] - a[1] * b[0]).atan2(a[0] * b[0] + a[1] * b[1])
+        };
+        assert!(((0..n).map(turn).sum::<f64>() - TAU).abs() < 1e-12);
+        assert!(!keeps_away(&points, 1e-9));
     }
 
     #[test]
-    fn a_curve_that_goes_round_twice_has_another_turning_number() {
+    fn a_curve_that_goes_round_twice_is_found() {
         let twice: Vec<Point2> = (0..40)
             .map(|i| {
                 let (s, c) = (f64::from(i) * 2.0 * TAU / 40.0).sin_cos();
@@ -153,6 +206,6 @@ mod tests {
                 [r * c, r * s]
             })
             .collect();
-        assert!((turning(&twice) - 2.0 * TAU).abs() < 1e-9);
+        assert!(!keeps_away(&twice, 1e-9));
     }
 }

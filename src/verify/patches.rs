@@ -246,8 +246,7 @@ fn measure(
         let beyond = surface.twin(h).map(|t| arrays.patch[t / 3]);
         cut[h] == 0 && beyond == Some(arrays.patch[h / 3])
     };
-    let simple =
-        !flipped && border::is_simple(surface, arrays, faces, inside, tolerance) == Some(true);
+    let simple = !flipped && border::is_simple(surface, arrays, faces, inside, tolerance);
     let overlap = match simple {
         true => Overlap::None,
         false => {

@@ -341,3 +341,42 @@ fn nothing_wrong_is_published() {
         tried(name, mesh);
     }
 }
+
+/// Fans of very many needles: all of them meet in one point, so that whoever compares them pair by pair does not come to an end.
+#[test]
+fn tens_of_thousands_of_needles_at_one_vertex_are_built() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, config) = configurations().swap_remove(0);
+    for (name, mesh) in [("fan", fan(30_000)), ("polygon", polygon(30_000))] {
+        let path = folder.path().join(format!("{name}.obj"));
+        write(&path, &mesh);
+        let outcome = job::run(&path, name, folder.path(), name, &config, &());
+        let messages: Vec<String> = outcome.failures().map(|f| f.1.message.clone()).collect();
+        assert_eq!(outcome.state_name(), "built", "{name}: {messages:?}");
+        let verdicts = verify(&folder.path().join(name), &VerifyOptions::default()).unwrap();
+        assert!(verdicts.all_passed(), "{name}: {verdicts}");
+    }
+}
+
+/// The overlay of two fans of n needles has n² vertices: it is refused before it is made.
+#[test]
+fn triangulations_that_cross_too_often_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, mut config) = configurations().swap_remove(0);
+    config.cones.strategy = ConeStrategy::Spread;
+    config.cones.count = Some(4);
+    let path = folder.path().join("bipyramid.obj");
+    write(&path, &bipyramid(7000));
+    let outcome = job::run(&path, "bipyramid", folder.path(), "bipyramid", &config, &());
+    let failures: Vec<_> = outcome.failures().collect();
+    assert_eq!(failures.len(), 1);
+    let failure = failures[0].1;
+    assert_eq!(failure.kind, FailureKind::Input, "{}", failure.message);
+    for words in [
+        "21000 edges",
+        "times (most: 1336000)",
+        "divide the long faces",
+    ] {
+        assert!(failure.message.contains(words), "{}", failure.message);
+    }
+}

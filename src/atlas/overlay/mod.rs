@@ -78,6 +78,18 @@ pub enum OverlayError {
     /// The places of the crossings on some edge are in no order.
     #[error("the crossings on an edge are in no order: please report this mesh")]
     Positions,
+    /// The two triangulations cross each other far more often than their sizes make believe.
+    #[error(
+        "on this mesh of {edges} edges the flat triangulation crosses them {crossings} times (most: {most}), since very many long thin faces lie side by side: divide the long faces, or remesh the surface with faces of similar sides"
+    )]
+    TooManyCrossings {
+        /// Edges of the mesh; doubled, if it has a boundary.
+        edges: usize,
+        /// How often they are crossed.
+        crossings: u128,
+        /// How often they may be.
+        most: u128,
+    },
     /// More faces than ids.
     #[error("the overlay would have {faces} faces, more than 32-bit ids can count")]
     TooLarge {
@@ -118,11 +130,36 @@ pub fn overlay(
             unmatched: 0,
         });
     };
+    check_crossings(&intrinsic)?;
     let curves = intrinsic
         .base_on_flat
         .trace(&intrinsic.base, &intrinsic.flat)?;
     let places = positions::positions(&intrinsic, &curves)?;
     refine(mesh, metric, prescription, *intrinsic, &curves, &places)
+}
+
+/// Most crossings, for each edge and besides: ordinary meshes have one or two an edge, and every crossing costs a kilobyte.
+const MOST_CROSSINGS: (u128, u128) = (16, 1_000_000);
+
+/// Refuses what would have many times the faces of the mesh, before anything is made of it: fans of n needles can cross n² times.
+fn check_crossings(intrinsic: &Intrinsic) -> Result<(), OverlayError> {
+    let edges = intrinsic.base.edge_count();
+    let most = MOST_CROSSINGS.0 * edges as u128 + MOST_CROSSINGS.1;
+    for integers in [
+        &intrinsic.base_on_delaunay,
+        &intrinsic.delaunay_on_flat,
+        &intrinsic.base_on_flat,
+    ] {
+        let crossings = integers.crossings()?;
+        if crossings > most {
+            return Err(OverlayError::TooManyCrossings {
+                edges,
+                crossings,
+                most,
+            });
+        }
+    }
+    Ok(())
 }
 
 /// The overlay from curves and the fractions of their crossings along both edges.

@@ -25,6 +25,33 @@ pub(super) fn borders(
     borders
 }
 
+/// The border of a set of faces as one closed path with the set on its left; none where it is not one. `sides` are its halfedges, in any order, `member`
+/// tells the faces of the set.
+pub(super) fn closed_path(
+    slit: &Slit,
+    sides: &[HalfedgeId],
+    member: impl Fn(FaceId) -> bool,
+) -> Option<Vec<HalfedgeId>> {
+    let c = slit.connectivity;
+    let inner = |h: HalfedgeId| slit.across(h).filter(|&t| member(c.face(t)));
+    let first = *sides.first()?;
+    let mut path = vec![first];
+    let mut h = first;
+    loop {
+        h = c.next(h);
+        while let Some(t) = inner(h) {
+            h = c.next(t);
+        }
+        if h == first {
+            return (path.len() == sides.len()).then_some(path);
+        }
+        if path.len() == sides.len() {
+            return None;
+        }
+        path.push(h);
+    }
+}
+
 /// The other faces at the tail of a halfedge, on its copy of the slit disk; a face may come twice.
 pub(super) fn around<'a>(slit: &'a Slit, start: HalfedgeId) -> impl Iterator<Item = FaceId> + 'a {
     let c = slit.connectivity;

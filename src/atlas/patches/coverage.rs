@@ -18,9 +18,22 @@ pub(super) struct Coverage {
     per_unit: f64,
     size: [usize; 2],
     is_single: Vec<bool>,
+    /// Where no cell need be looked at.
+    everywhere: bool,
 }
 
 impl Coverage {
+    /// For a region that overlaps itself nowhere.
+    pub fn everywhere() -> Self {
+        Self {
+            low: [0.0; 2],
+            per_unit: 0.0,
+            size: [0, 0],
+            is_single: Vec::new(),
+            everywhere: true,
+        }
+    }
+
     /// For a region of so many faces, with this border: its sides, with the region on their left.
     pub fn new(faces: usize, border: &[[[f64; 2]; 2]]) -> Self {
         let points = || border.iter().flatten();
@@ -35,6 +48,7 @@ impl Coverage {
             per_unit,
             size: [0, 0],
             is_single: Vec::new(),
+            everywhere: false,
         };
         // Without extent there is nothing to tell.
         if !per_unit.is_finite() || per_unit <= 0.0 {
@@ -96,6 +110,9 @@ impl Coverage {
 
     /// True where nothing else of the region lies where a face of it does. False where that is not known.
     pub fn is_single(&self, face: &Triangle) -> bool {
+        if self.everywhere {
+            return true;
+        }
         let [xs, mut ys] = self.cells(face);
         ys.all(|y| {
             let row = y * self.size[0];

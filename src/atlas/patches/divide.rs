@@ -21,7 +21,7 @@ use super::overlap::Triangle;
 use super::params::PatchParams;
 use super::placement::{Placement, place};
 use super::rectangle::smallest;
-use super::resolution::coarsest;
+use super::resolution::{coarsest, enough_long_side, shape};
 use super::sets::{Sets, in_order};
 use super::slit::Slit;
 use super::teeth::trim;
@@ -53,6 +53,8 @@ pub(super) struct Divider<'a> {
     slit: &'a Slit<'a>,
     bends: Bends,
     budget: Budget,
+    /// What a shorter side may ask for on the longer one.
+    enough: f64,
     params: &'a PatchParams,
     /// Whether nothing but creases divides.
     only_creases: bool,
@@ -92,6 +94,7 @@ impl<'a> Divider<'a> {
             slit,
             bends: Bends::new(slit),
             budget: Budget::default(),
+            enough: f64::INFINITY,
             params,
             only_creases: false,
         }
@@ -128,7 +131,9 @@ impl<'a> Divider<'a> {
         let rows = patches.par_iter();
         let demands = rows.map_init(|| Scratch::new(self.slit), demand);
         let demands: Vec<Demand> = demands.collect();
-        let least: Vec<f64> = demands.iter().map(|d| coarsest(d, self.params)).collect();
+        self.enough = enough_long_side(demands.iter().map(shape), self.params);
+        let coarsest = |d| coarsest(d, self.enough, self.params);
+        let least: Vec<f64> = demands.iter().map(coarsest).collect();
         self.budget = demand::budget(&demands, &least, self.params);
         demands.iter().map(|d| self.cost(d)).sum()
     }
@@ -227,11 +232,14 @@ impl<'a> Divider<'a> {
         found.sort_by_key(|f| f.0);
         let mut found = found.into_iter().map(|f| f.1);
         // What touches in the patch may overlap in a part, which is smaller and so is what counts as touching.
-        let is_injective = |border: &Vec<FaceId>| {
+        let mut is_injective = |(faces, border): (&Vec<FaceId>, &Vec<FaceId>)| {
             let part = Placement::new(slit, placement.positions, border.iter().copied());
-            part.is_injective(slit, border)
+            part.is_injective(sets, faces)
         };
-        let division = found.find(|division| division.borders.iter().all(is_injective));
+        let division = found.find(|division| {
+            let mut parts = division.parts.iter().zip(&division.borders);
+            parts.all(&mut is_injective)
+        });
         Row { faces, division }
     }
 
@@ -305,7 +313,7 @@ impl<'a> Divider<'a> {
     fn cost(&self, demand: &Demand) -> f64 {
         let texel = demand
             .texel(&self.budget)
-            .min(coarsest(demand, self.params));
+            .min(coarsest(demand, self.enough, self.params));
         let cost =
             demand.error(texel) + self.budget.worth * demand.texels(texel, self.budget.margin);
         // A patch without extent has no texel.

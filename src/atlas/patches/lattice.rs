@@ -12,7 +12,10 @@
 use super::demand::{self, Sums};
 use super::params::PatchParams;
 use super::rectangle::Oriented;
-use super::resolution::{Raster, coarsest_of, covered, demands, densest, least_covered, stretched};
+use super::resolution::{
+    Raster, coarsest_of, covered, demands, densest, enough_long_side, least_covered, shapes,
+    stretched,
+};
 use crate::atlas::patch::MAX_SIDE;
 use crate::atlas::plane::rotate;
 use rayon::prelude::*;
@@ -25,7 +28,7 @@ const ON_LINE: f64 = 1e-6;
 /// Rasters of all patches; `sums` are their areas and bends.
 pub(super) fn rasters(patches: &[Oriented], sums: &[Sums], params: &PatchParams) -> Vec<Raster> {
     let demands = demands(patches, sums);
-    let coarsest = coarsest_of(patches, params);
+    let coarsest = coarsest_of(patches, enough_long_side(shapes(patches), params), params);
     let tried = (0..FIRST_WIDTHS).into_par_iter().map(|i| {
         let first = (i as f64 / FIRST_WIDTHS as f64).exp2();
         let snapped = |i: usize, texel: f64| {

@@ -4,7 +4,7 @@
 use super::borders::{around, borders};
 use super::placement::{place, rounded_ln};
 use super::slit::Slit;
-use crate::geometry::ids::{FaceId, FaceVec};
+use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId};
 use rustc_hash::FxHashSet as Set;
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
@@ -176,6 +176,13 @@ pub(super) fn overlaps(
     let faces = a.faces.iter().chain(&b.faces).copied();
     let member = |f| labels.contains(&label[f]);
     let placement = place(slit, faces, root, highest, member, own);
+    let sides: Vec<HalfedgeId> = (a.faces.iter().chain(&b.faces))
+        .flat_map(|&f| slit.connectivity.face_halfedges(f))
+        .filter(|&h| !slit.beside(h).is_some_and(member))
+        .collect();
+    if placement.has_simple_border(slit, &sides, member) {
+        return false;
+    }
     let mut index = placement.index(slit, &small.faces);
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for &f in &small.faces {

@@ -1,8 +1,11 @@
 //! Where the faces of a region lie in the plane, and whether any of them overlap.
 
+use super::borders::closed_path;
 use super::overlap::{Triangle, TriangleIndex, size};
+use super::sets::Sets;
 use super::slit::Slit;
 use crate::geometry::ids::{FaceId, HalfedgeId};
+use crate::geometry::polygon::is_simple;
 
 /// Two sheets that overlap by no more than this part of the *patch's* extent touch. The chart's extent would
 /// not do: a patch may be a thousandth of it, and what touches there overlaps in the patch.
@@ -56,11 +59,38 @@ impl<'a> Placement<'a> {
         TOUCHING * self.extent
     }
 
-    /// True where no two faces of a disk overlap, of which those with a side on its border are given.
+    /// True where the border of a part of the slit disk, its `sides` in any order, is known to be one simple closed curve. Then no two of its faces overlap: a
+    /// disk of counterclockwise faces covers a point as often as its border winds around it. Where faces are long and all meet in one point, every pair
+    /// of them is near each other; pairs of edges of the border are not.
     ///
-    /// They are enough: where two sheets of a disk overlap the border of one ends, and it crosses the border of the other, since an immersed disk whose border is
-    /// a simple curve is embedded.
-    pub fn is_injective(&self, slit: &Slit, border: &[FaceId]) -> bool {
+    /// False says nothing: borders that touch, as both sides of a cut may, are left to the comparison of faces and its tolerance.
+    pub fn has_simple_border(
+        &self,
+        slit: &Slit,
+        sides: &[HalfedgeId],
+        member: impl Fn(FaceId) -> bool,
+    ) -> bool {
+        closed_path(slit, sides, member).is_some_and(|path| {
+            let at = |h: HalfedgeId| self.positions[slit.development.copy[h] as usize];
+            let points: Vec<[f64; 2]> = path.into_iter().map(at).collect();
+            is_simple(&points) == Some(true)
+        })
+    }
+
+    /// True where no two faces of a disk overlap.
+    ///
+    /// Where its border is not known to be simple, faces with a side on the border are compared. They are enough: where two sheets of a disk overlap the border of
+    /// one ends, and it crosses the border of the other, since an immersed disk whose border is a simple curve is embedded.
+    pub fn is_injective(&self, sets: &mut Sets, faces: &[FaceId]) -> bool {
+        let slit = sets.slit;
+        let sides = sets.sides(faces);
+        let set = sets.last;
+        self.has_simple_border(slit, &sides, |f| sets.has(f, set))
+            || self.is_free_of_overlaps(slit, &sets.border(faces))
+    }
+
+    /// True where no two of these faces overlap.
+    pub fn is_free_of_overlaps(&self, slit: &Slit, border: &[FaceId]) -> bool {
         let mut index = self.index(slit, border);
         border.iter().all(|&f| {
             let triangle = self.triangle(slit, f);
@@ -129,7 +159,13 @@ mod tests {
                 )
             };
             let brute = !pairs.into_iter().any(overlaps);
-            assert_eq!(placement.is_injective(&slit, &border), brute, "{turns}");
+            assert_eq!(
+                placement.is_free_of_overlaps(&slit, &border),
+                brute,
+                "{turns}"
+            );
+            let mut sets = Sets::new(&slit);
+            assert_eq!(placement.is_injective(&mut sets, &faces), brute, "{turns}");
             answers.push(brute);
         }
         assert_eq!(answers, [true, true, true, false, false, false]);

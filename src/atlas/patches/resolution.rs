@@ -15,8 +15,15 @@ use crate::atlas::texels::{Bend, Shares};
 const MIN_SHORT_SIDE: f64 = 8.0;
 /// … or this part of what the longer side must have, where that is less: who asks for small images wants them narrow too.
 const MIN_SHORT_PART: f64 = 0.5;
-/// The shorter side asks for no more than this on the longer one.
+/// The shorter side asks for no more than this on the longer one …
 const ENOUGH_LONG_SIDE: f64 = 1024.0;
+/// … and for half as much, and so on, where the least images of all patches together have more texels than this, and than the budget this many times:
+/// thousands of patches a thousand times as long as wide are no reason for fifty times the texels.
+const MOST_IN_FLOORS: f64 = (1 << 20) as f64;
+/// See [`MOST_IN_FLOORS`].
+const MOST_BUDGETS: f64 = 4.0;
+/// An image gets no larger than this only to have texel centres inside a patch that is a thin arc.
+const MOST_TO_COVER: usize = 1 << 16;
 /// Part of the texels in a square of the least shorter side whose centres a patch covers.
 const MIN_COVERED: f64 = 0.375;
 
@@ -42,7 +49,7 @@ pub(super) fn rasters(patches: &[Oriented], sums: &[Sums], params: &PatchParams)
     let margin = params.padding as f64;
     let most = densest(params);
     let demands = demands(patches, sums);
-    let coarsest = coarsest_of(patches, params);
+    let coarsest = coarsest_of(patches, enough_long_side(shapes(patches), params), params);
     let budget = demand::budget(&demands, &coarsest, params);
     let least = least_covered(params);
     let texels = demands.iter().zip(&coarsest);
@@ -59,7 +66,7 @@ pub(super) fn rasters(patches: &[Oriented], sums: &[Sums], params: &PatchParams)
                 if covered(patch, &raster, least) >= least {
                     return raster;
                 }
-                if columns >= most {
+                if columns >= most || raster.width * raster.height >= MOST_TO_COVER {
                     return stretched(patch.height, columns, margin);
                 }
                 columns = (2.0 * columns).min(most);
@@ -78,11 +85,37 @@ pub(super) fn demands(patches: &[Oriented], sums: &[Sums]) -> Vec<Demand> {
     patches.iter().zip(sums).map(demand).collect()
 }
 
-/// The widest texels that the images of patches may have.
-pub(super) fn coarsest_of(patches: &[Oriented], params: &PatchParams) -> Vec<f64> {
+/// Height and area of patches in units of their longer sides.
+pub(super) fn shapes(patches: &[Oriented]) -> impl Iterator<Item = [f64; 2]> + Clone + '_ {
+    patches.iter().map(|p| [p.height, p.area])
+}
+
+/// What the shorter side may ask for on the longer one, for patches of these heights and areas.
+pub(super) fn enough_long_side(
+    shapes: impl Iterator<Item = [f64; 2]> + Clone,
+    params: &PatchParams,
+) -> f64 {
+    let margin = 2.0 * params.padding as f64;
+    let most = (MOST_BUDGETS * params.texel_budget as f64).max(MOST_IN_FLOORS);
+    let texels = |enough: f64| -> f64 {
+        let of = shapes.clone().map(|[height, area]| {
+            let columns = least_density(height, area, enough, params);
+            (columns + margin) * ((columns * height).max(1.0) + margin)
+        });
+        of.sum()
+    };
+    let mut enough = ENOUGH_LONG_SIDE;
+    while enough > params.min_side as f64 && texels(enough) > most {
+        enough *= 0.5;
+    }
+    enough
+}
+
+/// The widest texels that the images of patches may have; `enough` is [`enough_long_side`].
+pub(super) fn coarsest_of(patches: &[Oriented], enough: f64, params: &PatchParams) -> Vec<f64> {
     patches
         .iter()
-        .map(|p| p.to_chart.scale / least_density(p.height, p.area, params))
+        .map(|p| p.to_chart.scale / least_density(p.height, p.area, enough, params))
         .collect()
 }
 
@@ -94,8 +127,9 @@ pub(super) fn adapted(
     params: &PatchParams,
 ) -> Vec<Raster> {
     let margin = params.padding as f64;
+    let enough = enough_long_side(shapes(patches), params);
     let least = patches.iter().flat_map(|patch| {
-        let by_area = area_floor(patch.area, params);
+        let by_area = area_floor(patch.area, enough, params);
         let columns = by_area.max(params.min_side as f64).min(densest(params));
         [columns, least_short(params).max(by_area * patch.height)]
     });
@@ -118,7 +152,8 @@ pub(super) fn adapted(
             };
             let density = [columns, rows / patch.height.max(1e-12)];
             let raster = raster(patch.height, columns, density, rows, margin);
-            let is_finest = columns.max(rows) >= densest(params);
+            let is_finest = columns.max(rows) >= densest(params)
+                || raster.width * raster.height >= MOST_TO_COVER;
             if is_finest || covered(patch, &raster, covered_least) >= covered_least {
                 return raster;
             }
@@ -156,26 +191,31 @@ pub(super) fn least_covered(params: &PatchParams) -> usize {
 }
 
 /// Least texels on the longer side of a patch, of which its shorter side and its area are parts.
-fn least_density(height: f64, area: f64, params: &PatchParams) -> f64 {
+fn least_density(height: f64, area: f64, enough: f64, params: &PatchParams) -> f64 {
     let least = least_short(params);
     let short_side = least / height.max(f64::MIN_POSITIVE);
     (params.min_side as f64)
-        .max(short_side.min(ENOUGH_LONG_SIDE))
-        .max(area_floor(area, params))
+        .max(short_side.min(enough))
+        .max(area_floor(area, enough, params))
         .min(densest(params))
 }
 
 /// Least texels on the longer side of a patch, of whose square its area is a part.
-fn area_floor(area: f64, params: &PatchParams) -> f64 {
+fn area_floor(area: f64, enough: f64, params: &PatchParams) -> f64 {
     let side = least_short(params) / area.max(f64::MIN_POSITIVE).sqrt();
-    side.min(ENOUGH_LONG_SIDE)
+    side.min(enough)
 }
 
-/// The widest texel that the image of a patch may have.
-pub(super) fn coarsest(demand: &Demand, params: &PatchParams) -> f64 {
+/// The widest texel that the image of a patch may have; `enough` is [`enough_long_side`].
+pub(super) fn coarsest(demand: &Demand, enough: f64, params: &PatchParams) -> f64 {
+    let [height, area] = shape(demand);
+    demand.sides[0] / least_density(height, area, enough, params)
+}
+
+/// Height and area in units of the longer side.
+pub(super) fn shape(demand: &Demand) -> [f64; 2] {
     let [longer, shorter] = demand.sides;
-    let area = demand.sums.flat / (longer * longer);
-    longer / least_density(shorter / longer, area, params)
+    [shorter / longer, demand.sums.flat / (longer * longer)]
 }
 
 /// Square texels, `columns` of them on the patch's width; its height in the middle of the rows.
@@ -294,6 +334,25 @@ mod tests {
             rasters(&[rectangle(0.1)], &[even(1.0, 0.1)], &params)[0].density[0]
         };
         assert_eq!([4, 8, 16, 32].map(columns), [20.0, 40.0, 80.0, 80.0]);
+    }
+
+    #[test]
+    fn many_long_patches_do_not_ask_for_many_budgets() {
+        let params = PatchParams::default();
+        let texels = |count: usize| {
+            let patches: Vec<Oriented> = (0..count).map(|_| rectangle(1e-3)).collect();
+            let r = rasters(&patches, &vec![even(1.0, 1e-3); count], &params);
+            let texels = r.iter().map(|r| r.width * r.height);
+            texels.sum::<usize>() as f64 / params.texel_budget as f64
+        };
+        // A few keep what makes them useful; very many never fall below the least longer side.
+        assert!(texels(10) * 262144.0 > 10.0 * 1024.0);
+        assert!(texels(1000) < 1.2 * MOST_BUDGETS, "{}", texels(1000));
+        assert!(
+            texels(4000) < 4000.0 * 20.0 * 30.0 / 262144.0,
+            "{}",
+            texels(4000)
+        );
     }
 
     #[test]

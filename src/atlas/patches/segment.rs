@@ -117,8 +117,12 @@ fn cover(
         let stamp = sets.mark(&region);
         let member = |f| sets.stamp[f] == stamp;
         let placement = place(slit, region.iter().copied(), seed, highest, member, own);
-        let border: Vec<_> = border.iter().map(|&h| placement.side(slit, h)).collect();
-        let coverage = Coverage::new(region.len(), &border);
+        let coverage = if placement.has_simple_border(slit, &border, member) {
+            Coverage::everywhere()
+        } else {
+            let border: Vec<_> = border.iter().map(|&h| placement.side(slit, h)).collect();
+            Coverage::new(region.len(), &border)
+        };
         let grown = grow(sets, &region, seed, stamp, &placement, &coverage);
         let stamp = sets.mark(&grown);
         let left_over = region.iter().filter(|&&f| sets.stamp[f] != stamp);
@@ -132,7 +136,7 @@ fn cover(
             let closer = Placement::new(slit, positions, disk.iter().copied());
             // The growth has shown it for what is as large.
             let is_known = closer.extent == placement.extent;
-            if is_known || closer.is_injective(slit, &sets.border(&disk)) {
+            if is_known || closer.is_injective(sets, &disk) {
                 disks.push(disk);
             } else {
                 stack.push(disk);

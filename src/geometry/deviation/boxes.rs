@@ -1,14 +1,19 @@
 //! The nearest triangle to a point, through a tree of boxes.
 
 use super::{Triangles, corners, normal};
-use crate::geometry::mesh::{bounding_box, distance_to_segment, dot, sub};
+use crate::geometry::mesh::{bounding_box, cross, distance_to_segment, dot, norm, sub};
 
 /// Most triangles in a leaf.
 const LEAF: usize = 4;
+/// No number of a turned box.
+const NONE: u32 = u32::MAX;
+/// So many triangles side by side are longer than this part of their box only where they are long and thin.
+const MANY: (usize, f64) = (8, 0.25);
 
 /// Triangles sorted into nested boxes: each node halves its triangles at the median of the widest axis of their centres.
 pub(super) struct BoxTree {
     nodes: Vec<Node>,
+    turned: Vec<TurnedBox>,
     /// Corners of the triangles, in the order of the leaves.
     triangles: Vec<[[f64; 3]; 3]>,
 }
@@ -16,10 +21,21 @@ pub(super) struct BoxTree {
 struct Node {
     low: [f64; 3],
     high: [f64; 3],
+    /// Number of its turned box, [`NONE`] where it needs none.
+    turned: u32,
     /// First triangle of a leaf, or the second child; the first one follows its parent.
     at: u32,
     /// Triangles of a leaf; 0 for a node with children.
     count: u32,
+}
+
+/// A box along the longest side of some triangles. Boxes along the coordinates of long thin triangles side by side all overlap, these do not.
+#[derive(Clone, Copy, Debug, Default)]
+struct TurnedBox {
+    /// Unit vectors; 0 where there is no such box.
+    axes: [[f64; 3]; 3],
+    low: [f64; 3],
+    high: [f64; 3],
 }
 
 /// What is nearest to a point.
@@ -37,9 +53,13 @@ impl BoxTree {
         if triangles.is_empty() || triangles.len() > u32::MAX as usize / 2 {
             return None;
         }
-        let mut nodes = Vec::with_capacity(triangles.len());
-        divide(&mut triangles, 0, &mut nodes);
-        Some(Self { nodes, triangles })
+        let (mut nodes, mut turned) = (Vec::with_capacity(triangles.len()), Vec::new());
+        divide(&mut triangles, 0, &mut nodes, &mut turned);
+        Some(Self {
+            nodes,
+            turned,
+            triangles,
+        })
     }
 
     /// Normal of a triangle, of any length.
@@ -49,16 +69,23 @@ impl BoxTree {
 
     /// The triangle nearest to a point. The search is quick where the triangle `near` is not far.
     pub fn nearest(&self, p: [f64; 3], near: usize) -> Nearest {
+        self.search(p, near).0
+    }
+
+    /// The same, and the number of triangles that were looked at.
+    pub(super) fn search(&self, p: [f64; 3], near: usize) -> (Nearest, usize) {
+        let mut looks = 1;
         let near = near.min(self.triangles.len() - 1);
         let mut best = (squared_distance(p, self.triangles[near]), near);
         let mut stack = vec![0];
         while let Some(at) = stack.pop() {
             let node = &self.nodes[at];
-            if squared_to_box(p, node) >= best.0 {
+            if self.squared_bound(p, node) >= best.0 {
                 continue;
             }
             if node.count > 0 {
                 let first = node.at as usize;
+                looks += node.count as usize;
                 for face in first..first + node.count as usize {
                     let d = squared_distance(p, self.triangles[face]);
                     if d < best.0 {
@@ -67,30 +94,48 @@ impl BoxTree {
                 }
             } else {
                 let (a, b) = (at + 1, node.at as usize);
-                let a_first =
-                    squared_to_box(p, &self.nodes[a]) <= squared_to_box(p, &self.nodes[b]);
+                let [to_a, to_b] = [a, b].map(|i| self.squared_bound(p, &self.nodes[i]));
+                let a_first = to_a <= to_b;
                 stack.extend(if a_first { [b, a] } else { [a, b] });
             }
         }
-        Nearest {
+        let found = Nearest {
             distance: best.0.sqrt(),
             face: best.1,
+        };
+        (found, looks)
+    }
+
+    /// What the squared distance to the triangles of a node is at the least.
+    fn squared_bound(&self, p: [f64; 3], node: &Node) -> f64 {
+        let upright = squared_to_box(p, node);
+        match self.turned.get(node.turned as usize) {
+            Some(turned) => upright.max(turned.squared_distance(p)),
+            None => upright,
         }
     }
 }
 
-fn divide(triangles: &mut [[[f64; 3]; 3]], first: usize, nodes: &mut Vec<Node>) {
+/// Returns the square of the longest side.
+fn divide(
+    triangles: &mut [[[f64; 3]; 3]],
+    first: usize,
+    nodes: &mut Vec<Node>,
+    turned: &mut Vec<TurnedBox>,
+) -> f64 {
     let (low, high) = bounding_box(triangles.as_flattened());
     let at = nodes.len();
     let is_leaf = triangles.len() <= LEAF;
     nodes.push(Node {
         low,
         high,
+        turned: NONE,
         at: first as u32,
         count: if is_leaf { triangles.len() as u32 } else { 0 },
     });
     if is_leaf {
-        return;
+        let sides = triangles.iter().flat_map(|t| (0..3).map(|k| side(t, k)));
+        return sides.map(|d| dot(d, d)).fold(0.0, f64::max);
     }
     // Three times the centres, which sort like them.
     let centre = |t: &[[f64; 3]; 3], axis: usize| t[0][axis] + t[1][axis] + t[2][axis];
@@ -109,9 +154,60 @@ fn divide(triangles: &mut [[[f64; 3]; 3]], first: usize, nodes: &mut Vec<Node>) 
     let half = triangles.len() / 2;
     triangles.select_nth_unstable_by(half, |a, b| centre(a, axis).total_cmp(&centre(b, axis)));
     let (left, right) = triangles.split_at_mut(half);
-    divide(left, first, nodes);
+    let longest = divide(left, first, nodes, turned);
     nodes[at].at = nodes.len() as u32;
-    divide(right, first + half, nodes);
+    let longest = longest.max(divide(right, first + half, nodes, turned));
+    let diagonal = sub(high, low);
+    if triangles.len() > MANY.0 && longest > MANY.1 * MANY.1 * dot(diagonal, diagonal) {
+        nodes[at].turned = turned.len() as u32;
+        turned.push(TurnedBox::around(triangles));
+    }
+    longest
+}
+
+fn side(t: &[[f64; 3]; 3], k: usize) -> [f64; 3] {
+    sub(t[(k + 1) % 3], t[k])
+}
+
+impl TurnedBox {
+    /// Its axes: along the longest side of any of the triangles, along that triangle's normal, and across both.
+    fn around(triangles: &[[[f64; 3]; 3]]) -> Self {
+        let sides = triangles.iter().flat_map(|t| (0..3).map(move |k| (t, k)));
+        let squared = |(t, k): (&_, _)| dot(side(t, k), side(t, k));
+        let longer = |a, b| squared(a) >= squared(b);
+        let Some(longest) = sides.reduce(|a, b| if longer(a, b) { a } else { b }) else {
+            return Self::default();
+        };
+        let (along, upward) = (side(longest.0, longest.1), normal(*longest.0));
+        let axes = [along, upward, cross(along, upward)].map(|d| {
+            let length = norm(d);
+            d.map(|x| x / length)
+        });
+        if !axes.as_flattened().iter().all(|x| x.is_finite()) {
+            return Self::default();
+        }
+        let points = || triangles.as_flattened().iter();
+        // Products are rounded a few times.
+        let reach = points().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let margin = 16.0 * f64::EPSILON * reach;
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for p in points() {
+            for (i, axis) in axes.iter().enumerate() {
+                let at = dot(*axis, *p);
+                low[i] = low[i].min(at - margin);
+                high[i] = high[i].max(at + margin);
+            }
+        }
+        Self { axes, low, high }
+    }
+
+    fn squared_distance(&self, p: [f64; 3]) -> f64 {
+        let off = |i: usize| {
+            let at = dot(self.axes[i], p);
+            (self.low[i] - at).max(at - self.high[i]).max(0.0)
+        };
+        (0..3).map(|i| off(i) * off(i)).sum()
+    }
 }
 
 fn squared_to_box(p: [f64; 3], node: &Node) -> f64 {

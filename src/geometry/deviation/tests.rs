@@ -94,6 +94,35 @@ fn the_tree_finds_what_a_search_through_all_finds() {
     }
 }
 
+/// Boxes of needles that meet in one point all overlap.
+#[test]
+fn looks_into_a_fan_do_not_grow_with_it() {
+    let looks = [1000_u32, 16_000].map(|sides| {
+        let at = |i: u32| {
+            let (s, c) = (f64::from(i) * std::f64::consts::TAU / f64::from(sides)).sin_cos();
+            [c, s, 0.1 * c]
+        };
+        let positions: Vec<[f64; 3]> = std::iter::once([0.0; 3])
+            .chain((0..sides).map(at))
+            .collect();
+        let faces: Vec<[u32; 3]> = (0..sides)
+            .map(|i| [0, 1 + i, 1 + (i + 1) % sides])
+            .collect();
+        let tree = BoxTree::new(Triangles {
+            positions: &positions,
+            faces: &faces,
+        })
+        .expect("triangles");
+        let of = (0..500).map(|i| {
+            let p = [0, 1, 2].map(|x| 1.6 * uniform(7 * i + x) - 0.8);
+            tree.search(p, 0).1
+        });
+        of.sum::<usize>() as f64 / 500.0
+    });
+    assert!(looks[1] < 2.0 * looks[0], "{looks:?}");
+    assert!(looks[1] < 160.0, "{looks:?}");
+}
+
 const SQUARE: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
 
 fn square(height: f64, side: f64) -> Vec<[f64; 3]> {
