@@ -2,7 +2,7 @@
 
 use crate::common::Triangles;
 use crate::models::{self, Chosen, Random, distance};
-use affine_atlas::flow::cones::{BoundaryCondition, ConeObjective, ConeParams};
+use affine_atlas::flow::cones::{BoundaryCondition, ConeParams};
 use affine_atlas::geometry::mesh::Mesh;
 use std::path::Path;
 
@@ -17,18 +17,14 @@ const CURVATURE: f64 = 1e-9;
 /// or both sets of cones are worth the same on the finer one.
 ///
 /// The edge length is the mean of the mesh or the longest edge at the cone, whichever is longer.
-pub fn subdivision(
-    file: &Path,
-    condition: BoundaryCondition,
-    objective: ConeObjective,
-) -> Result<(), String> {
+pub fn subdivision(file: &Path, condition: BoundaryCondition) -> Result<(), String> {
     let coarse = models::read(file);
     let mut fine = models::read(file);
     fine.subdivide();
     let (coarse, fine) = (models::mesh(&coarse), models::mesh(&fine));
     let mut failed = Vec::new();
     for count in COUNTS {
-        let params = params(count, objective);
+        let params = params(count);
         let (_, few) = models::choose(&coarse, &params, condition)?;
         let (given, many) = models::choose(&fine, &params, condition)?;
         let (off, shift) = pair(&coarse, &few, &fine, &many);
@@ -44,8 +40,8 @@ pub fn subdivision(
         // Two optima that are worth the same, or a miss? Vertices of the coarse mesh keep their numbers in the fine one.
         let kept = models::prescribe(&fine, &few, condition)?;
         let (kept, new) = (
-            models::distortion(&fine, &kept)?.of(objective),
-            models::distortion(&fine, &given)?.of(objective),
+            models::distortion(&fine, &kept)?.cost.sqrt(),
+            models::distortion(&fine, &given)?.cost.sqrt(),
         );
         if (kept / new - 1.0).abs() < TIE {
             println!(
@@ -66,11 +62,11 @@ pub fn subdivision(
 }
 
 /// The same cones after a rigid motion, at another size, with other numbers, and with other threads.
-pub fn invariance(file: &Path, objective: ConeObjective) -> Result<(), String> {
+pub fn invariance(file: &Path) -> Result<(), String> {
     let triangles = models::read(file);
     let condition = BoundaryCondition::Free;
     for count in COUNTS {
-        let params = params(count, objective);
+        let params = params(count);
         let of = |triangles: &Triangles| {
             let (_, chosen) = models::choose(&models::mesh(triangles), &params, condition)?;
             Ok::<_, String>(chosen)
@@ -103,10 +99,9 @@ pub fn invariance(file: &Path, objective: ConeObjective) -> Result<(), String> {
     Ok(())
 }
 
-fn params(count: usize, objective: ConeObjective) -> ConeParams {
+fn params(count: usize) -> ConeParams {
     ConeParams {
         count: Some(count),
-        objective,
         ..ConeParams::default()
     }
 }
