@@ -1,12 +1,12 @@
 //! The automatic choice of cones against one Newton flow on the same mesh with the cones chosen.
 //!
-//! `cargo bench --bench cones -- [--levels N] [--runs N] MESH…`: each mesh and its N midpoint subdivisions, 8 (default) and 16 cones, both
-//! objectives. Choice and flow in turn, one thread; each figure the least of the runs (three). CPU seconds are those of
+//! `cargo bench --bench cones -- [--levels N] [--runs N] MESH…`: each mesh and its N midpoint subdivisions, the default and 16 cones.
+//! Choice and flow in turn, one thread; each figure the least of the runs (three). CPU seconds are those of
 //! all threads, and what the clock says stands beside them.
 
 mod common;
 
-use affine_atlas::flow::cones::{self, BoundaryParams, ConeObjective, ConeParams};
+use affine_atlas::flow::cones::{self, BoundaryParams, ConeParams};
 use affine_atlas::flow::ricci;
 use affine_atlas::geometry::ids::EdgeVec;
 use affine_atlas::geometry::mesh::{Mesh, Soup};
@@ -21,9 +21,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         .build_global()?;
     let arguments = Arguments::parse()?;
     println!(
-        "| mesh | vertices | cones | objective | choice: CPU, clock | flow: CPU, clock | ratio: CPU, clock |"
+        "| mesh | vertices | cones | choice: CPU, clock | flow: CPU, clock | ratio: CPU, clock |"
     );
-    println!("| --- | --- | --- | --- | --- | --- | --- |");
+    println!("| --- | --- | --- | --- | --- | --- |");
     for mesh in &arguments.meshes {
         let name = mesh.file_stem().unwrap_or_default().to_string_lossy();
         let mut triangles = Triangles::read(mesh)?;
@@ -32,20 +32,17 @@ fn main() -> Result<(), Box<dyn Error>> {
                 triangles.subdivide();
             }
             let mesh = repaired(&triangles)?;
-            for count in [8, 16] {
-                for objective in [ConeObjective::LogScale, ConeObjective::AreaDistortion] {
-                    let params = ConeParams {
-                        count: Some(count),
-                        objective,
-                        ..ConeParams::default()
-                    };
-                    measure(
-                        &format!("{name} level {level}"),
-                        &mesh,
-                        &params,
-                        arguments.runs,
-                    )?;
-                }
+            for count in [None, Some(16)] {
+                let params = ConeParams {
+                    count,
+                    ..ConeParams::default()
+                };
+                measure(
+                    &format!("{name} level {level}"),
+                    &mesh,
+                    &params,
+                    arguments.runs,
+                )?;
             }
         }
     }
@@ -122,10 +119,9 @@ fn measure(
         flat?;
     }
     println!(
-        "| {name} | {} | {placed} of {} | {:?} | {:.2} s, {:.2} s | {:.2} s, {:.2} s | {:.2}, {:.2} |",
+        "| {name} | {} | {placed}{} | {:.2} s, {:.2} s | {:.2} s, {:.2} s | {:.2}, {:.2} |",
         mesh.connectivity.vertex_count(),
-        params.count.unwrap_or(0),
-        params.objective,
+        (params.count).map_or(" by default".into(), |count| format!(" of {count}")),
         choice.cpu,
         choice.clock,
         flow.cpu,

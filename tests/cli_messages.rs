@@ -779,7 +779,7 @@ fn help() {
     Examples:
       affine-atlas cones bunny.obj                    0, 4, 8, 16 and 32 cones, as far as possible
       affine-atlas cones bunny.obj --counts 6,12 --out trials
-      affine-atlas cones bunny.obj --set cones.quantum=1/2 --set cones.objective=area-distortion
+      affine-atlas cones bunny.obj --set cones.quantum=1/2
       affine-atlas build affine-atlas-out/bunny.cones/bunny.cones-8.toml
 
     Flattens the surface with each number of cones, chosen by the program, and shows area distortion

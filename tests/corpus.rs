@@ -161,8 +161,8 @@ fn clean(model: &Path, genus: usize, loops: usize, settings: &[&str]) -> Result<
         return Err(format!("curvature error {}", max_error(&json)).into());
     }
     let cones = json["cones"].as_array().map_or(0, Vec::len);
-    // None on a disk that is flat as it is.
-    if cones > 8 {
+    // None on a disk that is flat as it is; 8, and 16 more where they gain much.
+    if cones > 24 {
         return Err(format!("{cones} cones by default").into());
     }
     if settings.is_empty() {
@@ -248,7 +248,7 @@ fn quarter_turns(corpus: &Path) -> Result<(), Failed> {
         let cones = json["cones"].as_array().map_or(0, Vec::len);
         let count = match setting {
             "cones.strategy=spread" => cones == 8,
-            _ => (3..=8).contains(&cones),
+            _ => (3..=24).contains(&cones),
         };
         if !count {
             return Err(format!("{setting}: {cones} cones").into());

@@ -90,6 +90,13 @@ fn unknown_key(
     path: String,
     value: &DeValue<'_>,
 ) -> ConfigError {
+    if let Some(instead) = keys::removed(&path) {
+        return ConfigError::RemovedKey {
+            at: source.at(span),
+            key: path,
+            instead,
+        };
+    }
     let section = !path.contains('.') && matches!(value, DeValue::Table(_));
     let known = match path.rsplit_once('.') {
         Some((parent, _)) if keys::is_section(parent) => {

@@ -128,6 +128,16 @@ pub enum ConfigError {
         /// What could stand there.
         known: Vec<&'static str>,
     },
+    /// A key of an earlier version.
+    #[error("{at}: there is no key `{key}` any more: {instead}")]
+    RemovedKey {
+        /// Where.
+        at: Box<Location>,
+        /// Its full path.
+        key: String,
+        /// What is so in its stead.
+        instead: &'static str,
+    },
     /// A value of another type than the key takes.
     #[error("{at}: `{key}` takes {expected}, but was given {got}")]
     WrongType {
@@ -236,6 +246,7 @@ impl ConfigError {
             Self::Syntax { at, .. }
             | Self::ConeLine { at, .. }
             | Self::UnknownKey { at, .. }
+            | Self::RemovedKey { at, .. }
             | Self::WrongType { at, .. }
             | Self::UnknownChoice { at, .. }
             | Self::OutOfRange { at, .. }
@@ -294,6 +305,7 @@ impl ConfigError {
                 format!("the sections are {}", list(known))
             }
             Self::UnknownKey { known, .. } => format!("known here: {}", list(known)),
+            Self::RemovedKey { key, .. } => format!("remove `{key}`"),
             Self::UnknownChoice {
                 nearest, allowed, ..
             } => match nearest {

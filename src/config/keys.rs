@@ -101,6 +101,18 @@ impl fmt::Display for Kind {
     }
 }
 
+/// Keys of earlier versions, each with what is so in its stead.
+const REMOVED: [(&str, &str); 1] = [(
+    "cones.objective",
+    "cones are chosen by one measure that weighs growing and shrinking alike and is near the best of both that there were",
+)];
+
+/// What is so in the stead of a key that earlier versions had.
+pub fn removed(path: &str) -> Option<&'static str> {
+    let found = REMOVED.iter().find(|(key, _)| *key == path);
+    found.map(|(_, instead)| *instead)
+}
+
 /// One key of the configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Key {
@@ -253,12 +265,6 @@ pub const KEYS: &[Key] = &[
         },
         "natural logarithms of length",
         "absent",
-    ),
-    key(
-        "cones.objective",
-        Kind::Choice(&["log-scale", "area-distortion"]),
-        "",
-        "\"log-scale\"",
     ),
     key(
         "cones.quantum",

@@ -589,3 +589,14 @@ fn cone_files_that_are_refused() {
     let text = load(&file, &[]).expect_err("no UTF-8").to_string();
     assert!(text.ends_with("byte 1 is not UTF-8 text"), "{text}");
 }
+
+#[test]
+fn a_key_of_an_earlier_version_is_refused_with_what_is_so_instead() {
+    let text = "[cones]\nobjective = \"log-scale\"\n";
+    let error = parse("a.toml", text, &[]).expect_err("removed");
+    let message = error.to_string();
+    let start =
+        "a.toml:2:1: there is no key `cones.objective` any more: cones are chosen by one measure";
+    assert!(message.starts_with(start), "{message}");
+    assert_eq!(error.remedy(), "remove `cones.objective`");
+}

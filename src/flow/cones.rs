@@ -5,15 +5,15 @@
 //!
 //! An asset may have several components, and Gauss–Bonnet holds for each: [`assign`] finds the component of every
 //! vertex and point that the user names, [`prescribe`] then works on one component. Without any wish the program chooses places and
-//! curvatures by itself (the private module `auto`), so that the log scale deviates least from its mean:
+//! curvatures by itself (the private module `auto`), so that areas grow and shrink least:
 //!
 //! | component | cones |
 //! | --- | --- |
-//! | closed, of any genus | at most 8 that add up to 2πχ; as many as that needs |
-//! | with boundary | at most 8, none where the surface is flat; the boundary is free |
-//! | with a boundary that is prescribed | no more than Gauss–Bonnet needs: none on a disk |
+//! | closed, of any genus | 8 that add up to 2πχ, or twice as many as that needs; more where each gains much |
+//! | with boundary | 8, or twice as many as the curvature of the interior needs; none where the surface is flat; the boundary is free |
+//! | with a boundary that is prescribed | no more than Gauss–Bonnet and the handles need: none on a disk |
 //!
-//! Cones that would lower the deviation by less than a hundredth are left out. A component to which a list names no cone is treated as
+//! Cones that would gain less than a hundredth are left out. A component to which a list names no cone is treated as
 //! if there were no list.
 //!
 //! *Guaranteed:* cone angles are positive, ΣK̄ = 2πχ (to rounding) unless the boundary is free, and then Σ over the interior
@@ -29,9 +29,7 @@ mod request;
 mod spread;
 
 pub use error::ConeError;
-pub use params::{
-    BoundaryParams, BoundarySpec, ConeObjective, ConeParams, ConeSpec, ConeStrategy, CornerSpec,
-};
+pub use params::{BoundaryParams, BoundarySpec, ConeParams, ConeSpec, ConeStrategy, CornerSpec};
 pub use request::{RequestedCone, Requests, assign};
 
 pub(crate) use super::pi_multiple::in_pi;

@@ -1,7 +1,7 @@
 //! The linear picture against the flow itself.
 
 use crate::models::{self, Chosen};
-use affine_atlas::flow::cones::{BoundaryCondition, ConeObjective, ConeParams};
+use affine_atlas::flow::cones::{BoundaryCondition, ConeParams};
 use affine_atlas::flow::solve::SymmetricSolver;
 use affine_atlas::geometry::ids::VertexId;
 use affine_atlas::geometry::mesh::Mesh;
@@ -90,31 +90,19 @@ fn predict(mesh: &Mesh, target: &[f64]) -> Result<f64, String> {
 
 /// Moving curvature from one cone to the next gains nothing to speak of: the choice is at a least value of what it was to make least, in
 /// the true flow.
-pub fn stationary(file: &Path, objective: ConeObjective) -> Result<(), String> {
+pub fn stationary(file: &Path) -> Result<(), String> {
     let mesh = models::mesh(&models::read(file));
-    let params = ConeParams {
-        objective,
-        ..ConeParams::default()
-    };
+    let params = ConeParams::default();
     let (given, chosen) = models::choose(&mesh, &params, BoundaryCondition::Free)?;
     let cost = |shift: f64, i: usize| -> Result<f64, String> {
         let mut other = chosen.clone();
         other[i].1 += shift;
         other[(i + 1) % chosen.len()].1 -= shift;
         let given = models::prescribe(&mesh, &other, BoundaryCondition::Free)?;
-        // The variance, like (9), is smooth where there is no distortion at all.
-        let of = models::distortion(&mesh, &given)?.of(objective);
-        Ok(match objective {
-            ConeObjective::LogScale => of * of,
-            ConeObjective::AreaDistortion => of,
-        })
+        Ok(models::distortion(&mesh, &given)?.cost)
     };
     let [low, high] = [params.min_curvature, params.max_curvature].map(|k| k.radians());
-    let here = models::distortion(&mesh, &given)?.of(objective);
-    let here = match objective {
-        ConeObjective::LogScale => here * here,
-        ConeObjective::AreaDistortion => here,
-    };
+    let here = models::distortion(&mesh, &given)?.cost;
     let mut failed = Vec::new();
     for i in 0..chosen.len() {
         let both = [chosen[i].1, chosen[(i + 1) % chosen.len()].1];
@@ -130,7 +118,7 @@ pub fn stationary(file: &Path, objective: ConeObjective) -> Result<(), String> {
             false => (f64::INFINITY, (here - less.min(more)) / here),
         };
         println!(
-            "{objective:?}, cones {i} and next: best {far:+.4} away, gains {:.3} %",
+            "cones {i} and next: best {far:+.4} away, gains {:.3} %",
             100.0 * gain
         );
         if far.abs() > FROM_BEST && gain > TO_GAIN {

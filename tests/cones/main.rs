@@ -7,6 +7,7 @@
 mod common;
 mod defaults;
 mod dense;
+mod genus;
 mod limits;
 mod linear;
 mod models;
@@ -16,7 +17,7 @@ mod quantum;
 mod stability;
 mod symmetry;
 
-use affine_atlas::flow::cones::{BoundaryCondition, ConeObjective};
+use affine_atlas::flow::cones::BoundaryCondition;
 use libtest_mimic::{Arguments, Failed, Trial};
 use std::path::{Path, PathBuf};
 
@@ -62,7 +63,7 @@ const STABLE: [(&str, BoundaryCondition); 10] = [
     ("face.obj", BoundaryCondition::Free),
     ("face.obj", BoundaryCondition::Uniform),
 ];
-/// Subdivided, they take a minute each: for `--ignored`, as the multiples of π/2 by area distortion.
+/// Subdivided, they take a minute each: for `--ignored`.
 const SLOW: [&str; 2] = ["nefertiti.obj", "kitten.obj"];
 /// Small ones with and without handles and boundary.
 const VARIED: [&str; 5] = [
@@ -72,43 +73,27 @@ const VARIED: [&str; 5] = [
     "three-holes.off",
     "lilium.obj",
 ];
-const OBJECTIVES: [ConeObjective; 2] = [ConeObjective::LogScale, ConeObjective::AreaDistortion];
 
 fn main() {
     let arguments = Arguments::from_args();
     let corpus = std::env::var_os("AFFINE_ATLAS_CORPUS").map(PathBuf::from);
     let mut trials = Vec::new();
     // The longest come first, so that no core waits for them in the end.
-    for objective in OBJECTIVES {
-        let case = move |corpus: &Path| quantum::quarter_turns(corpus, objective);
-        let quantum = trial(format!("quantum/{objective:?}"), corpus.clone(), case);
-        trials.push(match objective {
-            ConeObjective::LogScale => quantum,
-            ConeObjective::AreaDistortion => quantum.with_ignored_flag(true),
-        });
+    trials.push(trial(
+        "quantum".into(),
+        corpus.clone(),
+        quantum::quarter_turns,
+    ));
+    trials.push(trial("peers".into(), corpus.clone(), peers::beaten));
+    for model in VARIED {
+        let case = move |corpus: &Path| stability::invariance(&corpus.join(model));
+        trials.push(trial(format!("invariance/{model}"), corpus.clone(), case));
     }
-    for objective in OBJECTIVES {
-        for (name, peer) in [("bff", &peers::BFF[..]), ("ceps", &peers::CEPS[..])] {
-            let case = move |corpus: &Path| peers::beaten(corpus, peer, objective);
-            let name = format!("peers/{name}/{objective:?}");
-            trials.push(trial(name, corpus.clone(), case));
-        }
-        for model in VARIED {
-            let case = move |corpus: &Path| stability::invariance(&corpus.join(model), objective);
-            let name = format!("invariance/{objective:?}/{model}");
-            trials.push(trial(name, corpus.clone(), case));
-        }
-        let case = move |_: &Path| symmetry::platonic(objective);
-        trials.push(trial(format!("platonic/{objective:?}"), here(), case));
-        let case = move |_: &Path| symmetry::mirror(objective);
-        trials.push(trial(format!("mirror/{objective:?}"), here(), case));
-    }
-    // What (9) is near strong cones depends on the mesh, so its optima move with it; see benches/README.md.
-    let objective = ConeObjective::LogScale;
+    trials.push(trial("platonic".into(), here(), |_| symmetry::platonic()));
+    trials.push(trial("mirror".into(), here(), |_| symmetry::mirror()));
     for (model, condition) in STABLE {
-        let case =
-            move |corpus: &Path| stability::subdivision(&corpus.join(model), condition, objective);
-        let name = format!("subdivision/{objective:?}/{model}, {}", condition.name());
+        let case = move |corpus: &Path| stability::subdivision(&corpus.join(model), condition);
+        let name = format!("subdivision/{model}, {}", condition.name());
         let is_slow = SLOW.contains(&model) || corpus.is_none();
         trials.push(trial(name, corpus.clone(), case).with_ignored_flag(is_slow));
     }
@@ -130,10 +115,14 @@ fn main() {
     ] {
         let case = move |corpus: &Path| linear::prediction(&corpus.join(model));
         trials.push(trial(format!("prediction/{model}"), corpus.clone(), case));
-        for objective in OBJECTIVES {
-            let case = move |corpus: &Path| linear::stationary(&corpus.join(model), objective);
-            let name = format!("stationary/{objective:?}/{model}");
-            trials.push(trial(name, corpus.clone(), case));
+        let case = move |corpus: &Path| linear::stationary(&corpus.join(model));
+        trials.push(trial(format!("stationary/{model}"), corpus.clone(), case));
+    }
+    for genus in [0, 5, 24, 47, 73, 100] {
+        for is_open in [false, true] {
+            let case = move |_: &Path| genus::by_default(genus, is_open);
+            let name = format!("genus/{genus}{}", if is_open { ", open" } else { "" });
+            trials.push(trial(name, here(), case));
         }
     }
     for shape in optimality::SHAPES {

@@ -91,16 +91,8 @@ pub struct Distortion {
     pub area: f64,
     /// Standard deviation of the log scale.
     pub std: f64,
-}
-
-impl Distortion {
-    /// The one that an objective is about.
-    pub fn of(self, objective: cones::ConeObjective) -> f64 {
-        match objective {
-            cones::ConeObjective::LogScale => self.std,
-            cones::ConeObjective::AreaDistortion => self.area,
-        }
-    }
+    /// J = ln ∫e^{2u} + ln ∫e^{−2u}, which the choice makes least.
+    pub cost: f64,
 }
 
 /// (9) and the standard deviation of ½ ln(flat/source area), both areas normalised, over the faces of the overlay.
@@ -118,16 +110,35 @@ pub fn distortion(mesh: &Mesh, prescription: &Prescription) -> Result<Distortion
     let rows: Vec<[f64; 2]> = c.faces().filter_map(areas).collect();
     let total = |i: usize| rows.iter().map(|r| r[i]).sum::<f64>();
     let (source, flat) = (total(0), total(1));
-    let (mut area, mut mean, mut square) = (0.0, 0.0, 0.0);
+    let (mut area, mut mean, mut square, mut shrunk) = (0.0, 0.0, 0.0, 0.0);
     for [s, t] in rows {
         let (weight, share) = (s / source, t / flat);
         area += (share / weight - 1.0).powi(2) * weight;
         let log = 0.5 * (share / weight).ln();
         mean += weight * log;
         square += weight * log * log;
+        // The mean factor of growing is 1 here.
+        shrunk += weight * weight / share;
     }
     let std = (square - mean * mean).max(0.0).sqrt();
-    Ok(Distortion { area, std })
+    let cost = shrunk.ln();
+    Ok(Distortion { area, std, cost })
+}
+
+/// J = ln ∫e^{2u} + ln ∫e^{−2u} over the area of a number at each vertex.
+pub fn cost(mesh: &Mesh, u: &[f64]) -> f64 {
+    let c = &mesh.connectivity;
+    let (mut total, mut grown, mut shrunk) = (0.0, 0.0, 0.0);
+    for f in c.faces() {
+        let share = triangle_area(mesh.face_positions(f)) / 3.0;
+        for v in c.face_vertices(f) {
+            let factor = (2.0 * u[v.index()]).exp();
+            total += share;
+            grown += share * factor;
+            shrunk += share / factor;
+        }
+    }
+    f64::ln(grown / total) + f64::ln(shrunk / total)
 }
 
 /// Standard deviation over the area of a number at each vertex.

@@ -10,7 +10,7 @@ use affine_atlas::geometry::mesh::{Mesh, triangle_area};
 use affine_atlas::geometry::triangle;
 use std::f64::consts::{PI, TAU};
 
-/// What is asked for: the variance of the choice in the linear picture, or its true standard deviation, over the least.
+/// What is asked for: the variance of the choice in the linear picture, or the square root of its true J, over the least.
 const EXCESS: f64 = 1.05;
 /// Choices whose metric is looked at.
 const KEPT: usize = 12;
@@ -64,7 +64,7 @@ pub fn brute_force(shape: Shape) -> Result<(), String> {
                 all[*v as usize] = *k;
             }
             let linear = energy.of(&all);
-            let ours = real_variance(&mesh, &chosen, condition)?;
+            let ours = real_cost(&mesh, &chosen, condition)?;
             let range = [
                 params.min_curvature.radians(),
                 params.max_curvature.radians(),
@@ -81,7 +81,7 @@ pub fn brute_force(shape: Shape) -> Result<(), String> {
             let mut best = (f64::INFINITY, Vec::new());
             for (_, cones) in ranked {
                 let cones: Vec<_> = cones.into_iter().map(|(v, k)| (v as u32, k)).collect();
-                let variance = real_variance(&mesh, &cones, condition)?;
+                let variance = real_cost(&mesh, &cones, condition)?;
                 if variance < best.0 {
                     best = (variance, cones);
                 }
@@ -115,14 +115,10 @@ pub fn brute_force(shape: Shape) -> Result<(), String> {
 /// Variance in the linear picture, and the cones.
 type Ranked = (f64, Vec<(usize, f64)>);
 
-/// Variance over the area of the u that the flow finds.
-fn real_variance(
-    mesh: &Mesh,
-    chosen: &[Chosen],
-    condition: BoundaryCondition,
-) -> Result<f64, String> {
+/// J of the u that the flow finds.
+fn real_cost(mesh: &Mesh, chosen: &[Chosen], condition: BoundaryCondition) -> Result<f64, String> {
     let metric = models::flow(mesh, &models::prescribe(mesh, chosen, condition)?)?;
-    Ok(models::deviation(mesh, metric.log_scale.as_slice()).powi(2))
+    Ok(models::cost(mesh, metric.log_scale.as_slice()))
 }
 
 /// Variance of u as a quadratic function of the curvature of the interior vertices.

@@ -2,11 +2,11 @@
 
 use crate::common::Triangles;
 use crate::models::{self, Chosen, distance};
-use affine_atlas::flow::cones::{BoundaryCondition, ConeObjective, ConeParams};
+use affine_atlas::flow::cones::{BoundaryCondition, ConeParams};
 use std::f64::consts::PI;
 
 /// Flat faces: what bends the surface are the corners, and there is nothing left to distort.
-pub fn platonic(objective: ConeObjective) -> Result<(), String> {
+pub fn platonic() -> Result<(), String> {
     let mut failed = Vec::new();
     for (name, mut shape, levels, corners) in [
         ("tetrahedron", tetrahedron(), 4, 4),
@@ -21,7 +21,6 @@ pub fn platonic(objective: ConeObjective) -> Result<(), String> {
             for count in [corners, corners + 4] {
                 let params = ConeParams {
                     count: Some(count),
-                    objective,
                     ..ConeParams::default()
                 };
                 let (given, chosen) = models::choose(&mesh, &params, BoundaryCondition::Free)?;
@@ -46,7 +45,7 @@ pub fn platonic(objective: ConeObjective) -> Result<(), String> {
 
 /// A shape with one plane of symmetry, connectivity included: each cone has its mirror image among the cones, or the choice is better
 /// than both symmetric ones that half of it makes.
-pub fn mirror(objective: ConeObjective) -> Result<(), String> {
+pub fn mirror() -> Result<(), String> {
     let shape = bumps();
     let mesh = models::mesh(&shape);
     let c = &mesh.connectivity;
@@ -62,7 +61,6 @@ pub fn mirror(objective: ConeObjective) -> Result<(), String> {
     for count in [4, 5, 6, 8, 10, 12, 16] {
         let params = ConeParams {
             count: Some(count),
-            objective,
             ..ConeParams::default()
         };
         let (given, chosen) = models::choose(&mesh, &params, BoundaryCondition::Free)?;
@@ -75,9 +73,9 @@ pub fn mirror(objective: ConeObjective) -> Result<(), String> {
             let b = rest.remove(i);
             worst = (worst.0.max(far(b) / edge), worst.1.max((a.1 - b.1).abs()));
         }
-        let cost = models::distortion(&mesh, &given)?.of(objective);
+        let cost = models::distortion(&mesh, &given)?.cost.sqrt();
         println!(
-            "{objective:?}, {count}: {} cones, images up to {:.2} edges off, curvatures {:.4}; {cost:.5}",
+            "{count}: {} cones, images up to {:.2} edges off, curvatures {:.4}; {cost:.5}",
             chosen.len(),
             worst.0,
             worst.1
@@ -103,7 +101,7 @@ pub fn mirror(objective: ConeObjective) -> Result<(), String> {
             }
             let given = models::prescribe(&mesh, &both, BoundaryCondition::Free);
             let other = given.and_then(|given| models::distortion(&mesh, &given));
-            let Ok(other) = other.map(|d| d.of(objective)) else {
+            let Ok(other) = other.map(|d| d.cost.sqrt()) else {
                 continue;
             };
             println!(

@@ -14,6 +14,7 @@ use crate::flow::prescription::{BoundaryCondition, GAUSS_BONNET_TOLERANCE};
 use crate::geometry::connectivity::Topology;
 use crate::geometry::ids::{HalfedgeId, VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, distance};
+use crate::geometry::triangle::angles;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// The curvature that the boundary takes whatever the cones are, radians; also checks that the condition fits the surface.
@@ -63,6 +64,23 @@ pub(super) fn listed<'a>(
         }),
         None => Ok(&requests.boundary),
     }
+}
+
+/// The curvature that the boundary has in space, radians: π less the angles of the faces at each of its vertices. A face without angles counts as
+/// one of π in all.
+pub(super) fn own_total(mesh: &Mesh) -> f64 {
+    let c = &mesh.connectivity;
+    let mut total = 0.0;
+    for v in c.vertices().filter(|&v| c.is_boundary_vertex(v)) {
+        total += PI;
+        for h in c.outgoing(v) {
+            let lengths = c.face_edges(c.face(h)).map(|e| mesh.edge_length(e));
+            let angles = angles(lengths).unwrap_or([PI / 3.0; 3]);
+            let corner = c.corner(h);
+            total -= angles[corner];
+        }
+    }
+    total
 }
 
 /// Adds the curvature of the boundary to `target`, which holds that of the vertices that are `named`. On a uniform or prescribed

@@ -11,7 +11,7 @@ pub(super) const DEFAULT_COUNT: usize = 8;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ConeStrategy {
-    /// The list where there is one, else places and curvatures that make [`ConeObjective`] least; see [the module docs](super).
+    /// The list where there is one, else places and curvatures that distort areas least; see [the module docs](super).
     #[default]
     Auto,
     /// Those of the list.
@@ -22,17 +22,6 @@ pub enum ConeStrategy {
     Spread,
     /// No cones in the interior.
     None,
-}
-
-/// What the automatic choice of cones makes least.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ConeObjective {
-    /// Standard deviation of the log scale over the area: shrinking counts as much as growing.
-    #[default]
-    LogScale,
-    /// Area distortion (9): ruled by what grows; parts that shrink to nothing cost no more than their area.
-    AreaDistortion,
 }
 
 /// A cone that the user names by vertex or by point.
@@ -57,17 +46,15 @@ pub struct ConeParams {
     pub strategy: ConeStrategy,
     /// Cones by name; not empty means strategy `listed`.
     pub list: Vec<ConeSpec>,
-    /// Number of cones for `spread`, at least 1; the most that `auto` places in the interior. Absent: 8, but where curvature is
-    /// prescribed on the boundary `auto` places no more than Gauss–Bonnet needs.
+    /// Number of cones for `spread`, at least 1; the most that `auto` places in the interior. Absent: 8, and for `auto` as many as the
+    /// surface needs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub count: Option<usize>,
-    /// For `auto`: as few cones as keep |log scale − mean| below this where `count` allows; absent: `count` of them, as far as they pay.
+    /// For `auto`: as few cones as keep |log scale − mean| below this where `count` allows; absent: as many as pay.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub log_scale_bound: Option<f64>,
     /// For `auto`: K̄ of every cone is a multiple of this; 0: any.
     pub quantum: PiMultiple,
-    /// For `auto`: what is made least.
-    pub objective: ConeObjective,
     /// For `auto`: least K̄ of a cone, in multiples of π.
     pub min_curvature: PiMultiple,
     /// For `auto`: greatest K̄ of a cone, in multiples of π, below 2.
@@ -98,7 +85,6 @@ impl Default for ConeParams {
             count: None,
             log_scale_bound: None,
             quantum: PiMultiple::literal(0, 1),
-            objective: ConeObjective::default(),
             min_curvature: PiMultiple::literal(-4, 1),
             max_curvature: PiMultiple::literal(9, 8),
             boundary_distance: 0.0,

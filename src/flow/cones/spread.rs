@@ -3,8 +3,7 @@
 //! No choice depends on the numbering of vertices: where distances tie, the vertex with the lowest coordinates
 //! (x, then y, then z) wins, and only vertices at one position are told apart by their number.
 
-use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{NONE, VertexId, VertexVec};
+use crate::geometry::ids::{VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, distance, triangle_area};
 use rustc_hash::FxHashMap;
 use std::cmp::Ordering;
@@ -144,32 +143,6 @@ pub(super) fn around(mesh: &Mesh, source: VertexId, radius: f64) -> Vec<(VertexI
         }
     }
     found
-}
-
-/// For every vertex the number of the source that is fewest edges away; the first of several. 0 where there is none.
-pub(super) fn nearest_of(connectivity: &Connectivity, sources: &[usize]) -> Vec<u32> {
-    let mut nearest = vec![NONE; connectivity.vertex_count()];
-    let mut ring: Vec<VertexId> = Vec::new();
-    for (i, &v) in sources.iter().enumerate() {
-        nearest[v] = i as u32;
-        ring.push(VertexId::new(v));
-    }
-    while !ring.is_empty() {
-        let mut next = Vec::new();
-        for &v in &ring {
-            for w in connectivity.neighbours(v) {
-                if nearest[w.index()] == NONE {
-                    nearest[w.index()] = nearest[v.index()];
-                    next.push(w);
-                }
-            }
-        }
-        ring = next;
-    }
-    nearest
-        .iter()
-        .map(|&i| if i == NONE { 0 } else { i })
-        .collect()
 }
 
 /// Lowers `nearest` to the distance from the sources along the edges (Dijkstra), wherever that is less.

@@ -303,7 +303,7 @@ impl Flat {
         }
         if lines.is_empty() {
             lines.push(format!(
-                "to change: raise cones.count from {count} to {more}; or cones.objective = \"area-distortion\" where growing matters more than shrinking"
+                "to change: raise cones.count from {count} to {more}"
             ));
         }
         lines

@@ -46,8 +46,6 @@ pub struct Survey {
     pub id: String,
     /// The mesh as the user wrote it.
     pub given: String,
-    /// What the automatic choice made least.
-    pub objective: cones::ConeObjective,
     /// What the reader left out.
     pub notes: Vec<String>,
     /// In the order of their first face.
@@ -194,7 +192,7 @@ impl Task<'_> {
             rows,
             suggestion: None,
         };
-        survey.suggestion = suggestion::suggest(&survey, self.config.cones.objective);
+        survey.suggestion = suggestion::suggest(&survey);
         Ok(survey)
     }
 
@@ -379,7 +377,6 @@ pub fn run(
         let survey = Survey {
             id: id.to_owned(),
             given: given.to_owned(),
-            objective: config.cones.objective,
             notes: asset.notes,
             components: survey(&asset.soup, config, counts, observer)?,
         };

@@ -3,11 +3,9 @@
 //! Well-placed cones go on paying: twice as many lower the standard deviation of the log scale by nearly half, however many
 //! there are already. What is left to gain shrinks all the same, while every cone lengthens the cut and adds charts. So the suggestion is the
 //! least number after which no step to the next one tried (usually twice as many) evens out lengths by a tenth: u is a natural
-//! logarithm, and 0.1 of its deviation are ten percent of the length of what is drawn. Of areas, which go as the square, it is a
-//! fifth. The bound is a judgement about what one sees, not a theorem; the table beside it has the figures for another one.
+//! logarithm, and 0.1 of its deviation are ten percent of the length of what is drawn. The bound is a judgement about what one sees, not a theorem; the table beside it has the figures for another one.
 
-use super::{ComponentSurvey, Figures};
-use crate::flow::cones::ConeObjective;
+use super::ComponentSurvey;
 
 /// A number of cones, and why.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,59 +17,37 @@ pub struct Suggestion {
 }
 
 /// What steps are judged by.
-struct Measure {
-    name: &'static str,
-    of: fn(&Figures) -> f64,
-    /// A step that lowers it by less is not worth its seams.
-    worth: f64,
-    /// What that means.
-    meaning: &'static str,
-}
+const MEASURE: &str = "standard deviation of the log scale";
+/// A step that lowers it by less is not worth its seams …
+const WORTH: f64 = 0.1;
+/// … which means:
+const MEANING: &str = "lengths would be evener by less than a tenth";
 
-const LOG_SCALE: Measure = Measure {
-    name: "standard deviation of the log scale",
-    of: |figures| figures.log_scale.std,
-    worth: 0.1,
-    meaning: "lengths would be evener by less than a tenth",
-};
-
-const AREA_DISTORTION: Measure = Measure {
-    name: "square root of the area distortion (9)",
-    of: |figures| figures.area_distortion.sqrt(),
-    worth: 0.2,
-    meaning: "areas would be evener by less than a fifth",
-};
-
-/// The suggestion for a component, by what its choices of cones made least.
-pub(super) fn suggest(survey: &ComponentSurvey, objective: ConeObjective) -> Option<Suggestion> {
-    let measure = match objective {
-        ConeObjective::LogScale => LOG_SCALE,
-        ConeObjective::AreaDistortion => AREA_DISTORTION,
-    };
+/// The suggestion for a component.
+pub(super) fn suggest(survey: &ComponentSurvey) -> Option<Suggestion> {
     let mut tried: Vec<(usize, f64)> = survey
         .chosen()
-        .filter_map(|row| Some((row.asked, (measure.of)(row.result.as_ref().ok()?))))
+        .filter_map(|row| Some((row.asked, row.result.as_ref().ok()?.log_scale.std)))
         .collect();
     tried.sort_by_key(|t| t.0);
-    pick(&tried, &measure)
+    pick(&tried)
 }
 
 /// Where the last step ends that is worth its seams.
-fn pick(tried: &[(usize, f64)], measure: &Measure) -> Option<Suggestion> {
-    let is_worth = |pair: &[(usize, f64)]| pair[0].1 - pair[1].1 >= measure.worth;
+fn pick(tried: &[(usize, f64)]) -> Option<Suggestion> {
+    let is_worth = |pair: &[(usize, f64)]| pair[0].1 - pair[1].1 >= WORTH;
     let taken = tried.windows(2).rposition(is_worth).map_or(0, |i| i + 1);
     let &(count, now) = tried.get(taken)?;
-    let Measure { name, meaning, .. } = measure;
     let reason = match tried.get(taken + 1) {
         Some((more, then)) if then < &now => format!(
-            "{more} would lower the {name} by only {:.3}, from {now:.3} to {then:.3}: {meaning}",
+            "{more} would lower the {MEASURE} by only {:.3}, from {now:.3} to {then:.3}: {MEANING}",
             now - then
         ),
         Some((more, then)) => {
-            format!("{more} would not lower the {name} ({now:.3}, then {then:.3})")
+            format!("{more} would not lower the {MEASURE} ({now:.3}, then {then:.3})")
         }
-        None if tried.len() == 1 => format!("no other number was tried ({name} {now:.3})"),
-        None => format!("the last step still pays ({name} {now:.3}): more cones may, too"),
+        None if tried.len() == 1 => format!("no other number was tried ({MEASURE} {now:.3})"),
+        None => format!("the last step still pays ({MEASURE} {now:.3}): more cones may, too"),
     };
     Some(Suggestion { count, reason })
 }
@@ -82,7 +58,7 @@ mod tests {
 
     #[test]
     fn the_least_number_after_which_no_step_gains_much() {
-        let count = |tried: &[(usize, f64)]| pick(tried, &LOG_SCALE).map(|s| s.count);
+        let count = |tried: &[(usize, f64)]| pick(tried).map(|s| s.count);
         // As on nefertiti, spot, and a disk.
         assert_eq!(
             count(&[(4, 0.311), (8, 0.179), (16, 0.112), (32, 0.066)]),
@@ -103,15 +79,11 @@ mod tests {
         assert_eq!(count(&[(4, 0.3), (8, 0.4)]), Some(4));
         assert_eq!(count(&[(6, 0.3)]), Some(6));
         assert_eq!(count(&[]), None);
-        assert_eq!(
-            pick(&[(4, 0.9), (8, 0.75)], &AREA_DISTORTION).map(|s| s.count),
-            Some(4)
-        );
     }
 
     #[test]
     fn reasons_are_sentences_with_both_numbers() {
-        let reason = |tried: &[(usize, f64)]| pick(tried, &LOG_SCALE).expect("some").reason;
+        let reason = |tried: &[(usize, f64)]| pick(tried).expect("some").reason;
         assert_eq!(
             reason(&[(8, 0.179), (16, 0.112)]),
             "16 would lower the standard deviation of the log scale by only 0.067, from 0.179 to 0.112: lengths would be evener by less than a tenth"

@@ -156,7 +156,6 @@ impl Survey {
         json!({
             "id": self.id,
             "path": self.given,
-            "objective": self.objective,
             "notes": self.notes,
             "components": components,
         })

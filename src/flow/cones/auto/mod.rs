@@ -4,53 +4,60 @@
 //!
 //! | step | follows | ours |
 //! | --- | --- | --- |
-//! | log scale as a linear function of curvature, one factorisation ([`picture`]) | Ben-Chen, Gotsman, Bunin 2008 | variance of every answer at once, from the diagonal of an inverse |
-//! | few cones with little variance of the log scale ([`placement`], [`search`]) | the aim of Soliman, Slepčev, Crane 2018 and Fang et al. 2021 | exact gain of every vertex without a solve; exchange |
-//! | multiples of a quantum ([`quantum`]) | the aim of Li et al. 2022 | local search on a quadratic function of integers |
-//! | what the mesh really does ([`Placement::correct`]) | | some Newton steps of the flow |
-//! | cones moved until (9) is least ([`area`], [`near`], [`far`], [`moves`]) | moving cones: Li et al. 2023 | the force on every vertex at once; far moves on cells |
+//! | log scale as a linear function of curvature, one factorisation ([`picture`]) | Ben-Chen, Gotsman, Bunin 2008 | |
+//! | the distortion of area, growing and shrinking alike ([`objective`]) | the aim of Soliman, Slepčev, Crane 2018 and Fang et al. 2021 with another measure | convex, of any size |
+//! | what a cone does to its own vertex ([`star`]) | vertex scaling in a regular star | |
+//! | places for cones: where a little curvature gains most ([`candidates`], [`search`]) | conditional gradients on measures, Bredies and Pikkarainen 2013 | a pool of them |
+//! | the best few of them ([`pool`], [`tableau`]) | | every exchange read off one pivoted matrix |
+//! | cones moved on the surface ([`search`]) | Li et al. 2023 | rings of candidates along the force |
+//! | multiples of a quantum ([`quantum`]) | the aim of Li et al. 2022 | local search in the same model |
+//! | what the mesh really does ([`picture`]) | | some steps with the same factor |
 //!
-//! The two objectives differ. The standard deviation of the log scale counts shrinking and growing alike. (9) is ruled by what grows: an ear
-//! that shrinks to nothing costs it no more than the ear's area, so with few cones its optimum may be a surface that lost its ears.
+//! How many: what Gauss–Bonnet and the limits need on a closed surface; on a free boundary, which can take any curvature, what the
+//! interior has by itself and would leave to it; a cone's worth for each loop, 2π, is left to it at most. Twice that number, and 8 at least, is what is looked for where `cones.count` is absent. Of these, cones that gain less
+//! than a hundredth are left out; beyond them come up to 16 more, as long as each lowers the square root of a large objective by a twenty-fifth.
 //!
 //! *Guaranteed:* the same choice for the same surface, moved, scaled or numbered otherwise, unless places tie; never more cones than asked
-//! for; with a quantum every curvature a multiple of it. *Not guaranteed:* the global optimum. With `count` cones, those that do not pay are left
-//! out.
+//! for; with a quantum every curvature a multiple of it. *Not guaranteed:* the global optimum.
 
-mod area;
-mod arrangement;
+mod candidates;
 mod cells;
-mod climb;
-mod dot;
-mod far;
-mod found;
-mod moves;
-mod near;
+mod objective;
 mod picture;
 mod placement;
-mod quadratic;
+mod pool;
 mod quantum;
 mod search;
+mod star;
+mod tableau;
 
 use super::error::ConeError;
-use super::params::{BoundaryParams, ConeObjective, ConeParams, DEFAULT_COUNT};
+use super::params::{BoundaryParams, ConeParams, DEFAULT_COUNT};
 use super::request::{RequestedCone, Requests};
 use super::{boundary, spread};
 use crate::flow::prescription::BoundaryCondition;
 use crate::geometry::connectivity::Topology;
 use crate::geometry::ids::{VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
-use arrangement::Rule;
-use found::{Found, cheapest};
-use moves::FINE;
+use objective::NOTHING;
 use picture::Picture;
-use placement::{Choice, Placement};
-use quadratic::Limits;
+use placement::Placement;
+use pool::{Cones, Rule};
 use quantum::Quanta;
+use search::Count;
 use std::f64::consts::TAU;
+use tableau::Limits;
 
-/// Share of the real cost by which the linear picture may be wrong before it is corrected.
-const AS_PROMISED: f64 = 0.02;
+/// Cones beyond the number that is looked for first, at most, …
+const MORE: usize = 16;
+/// … where that is no more than this.
+const MANY: usize = 48;
+/// Share of the real objective by which the linear picture may be wrong before it is corrected, and on a small mesh.
+const AS_PROMISED: [f64; 2] = [0.05, 0.01];
+/// Radii of the rings on which cones move after a correction, in square roots of the area.
+const SETTLED_RADII: [f64; 1] = [0.01];
+/// How often all of a small mesh is looked at anew at most.
+const LOOKS: usize = 4;
 /// Curvatures in excess of a limit that are rounding, radians.
 const ROUNDING: f64 = 1e-9;
 
@@ -70,36 +77,54 @@ pub(super) fn select(
     };
     let allowed = allowed(mesh, cones.boundary_distance);
     let places = allowed.iter().filter(|&&a| a).count();
-    let least = least_count(limits);
-    let wanted = match (cones.count, condition) {
-        (Some(count), _) => count,
-        (None, BoundaryCondition::Free) => DEFAULT_COUNT.max(least),
-        // Whoever asks for a rectangle wants one.
-        (None, _) => least,
-    };
-    let most = wanted.min(places);
-    if most < least {
-        return Err(match places < least {
-            true => ConeError::TooFewVertices {
-                wanted: least,
-                interior: places,
-            },
-            false => ConeError::TooFewCones {
-                count: wanted,
+    let least = least_count(limits.range, given.total.unwrap_or(0.0));
+    let count = match cones.count {
+        Some(count) if count < least => {
+            return Err(ConeError::TooFewCones {
+                count,
                 least,
                 total: given.total.unwrap_or(0.0),
-            },
+            });
+        }
+        Some(count) => Count {
+            least,
+            wanted: count.min(places),
+            most: count.min(places),
+        },
+        None => {
+            let needed = least.max(needed(mesh, topology, condition, limits.range, &given));
+            let [wanted, most] = match condition {
+                BoundaryCondition::Free => {
+                    let wanted = DEFAULT_COUNT.max(2 * needed);
+                    // Of many, each gains little.
+                    let more = if wanted <= MANY { MORE } else { 0 };
+                    [wanted, wanted + more]
+                }
+                // Whoever asks for a rectangle wants one.
+                _ => [needed; 2],
+            };
+            Count {
+                least,
+                wanted: wanted.min(places),
+                most: most.min(places),
+            }
+        }
+    };
+    if places < least {
+        return Err(ConeError::TooFewVertices {
+            wanted: least,
+            interior: places,
         });
     }
     let quanta = match cones.quantum.radians() {
         size if size > 0.0 => Some(quanta(size, limits)?),
         _ => None,
     };
-    if most == 0 {
+    if count.most == 0 {
         return Ok(Vec::new());
     }
     let is_free = topology.boundary_loops > 0 && condition == BoundaryCondition::Free;
-    let mut picture = Picture::new(mesh, is_free)?;
+    let picture = Picture::new(mesh, is_free)?;
     let mut background: Vec<f64> = given.curvature;
     let own = background.iter_mut().zip(&picture.curvature);
     own.for_each(|(b, k)| *b -= k);
@@ -110,38 +135,44 @@ pub(super) fn select(
         area.for_each(|(b, w)| *b += total * w);
         sink.clone_from(&picture.weight);
     }
-    let c = &mesh.connectivity;
-    let mut placement = Placement::new(&mut picture, c, background, sink, limits, allowed);
-    let search = Search {
-        mesh,
-        cones,
-        least,
-        most,
-        quanta,
+    let mut placement = Placement::new(mesh, picture, background, sink, limits, allowed);
+    let search = |placement: &mut Placement| match cones.log_scale_bound {
+        Some(bound) => placement.search_bounded(count, bound),
+        None => placement.search(count),
     };
-    // Where curvatures are quanta, many small ones and a few large ones are different surfaces: each greatest number is tried.
-    let caps = match quanta {
-        Some(quanta) => quanta.caps(most),
-        None => vec![limits],
-    };
-    let mut found = Vec::new();
-    for limits in caps {
-        placement.limits = limits;
-        found.extend(search.run(&mut placement)?);
+    let mut found = search(&mut placement);
+    if is_free {
+        // A short border is little area, however much curvature it takes.
+        let own = own_inside(mesh, topology);
+        let total: f64 = found.iter().take(1).flat_map(|best| &best.curvature).sum();
+        let slack = TAU * topology.boundary_loops as f64;
+        let within = total.clamp(own - slack, own + slack);
+        if (total - within).abs() > ROUNDING
+            && least_count(limits.range, within) <= count.wanted
+            && quanta.is_none()
+        {
+            placement.limits.total = Some(within);
+            found = search(&mut placement);
+        }
     }
-    let best = cheapest(found);
-    let Some(Found {
-        vertices,
-        curvature,
-        ..
-    }) = best
-    else {
-        return Err(ConeError::NoQuanta {
-            quantum: cones.quantum.radians(),
-            total: given.total.unwrap_or(0.0),
-            count: most,
-        });
+    let (found, rule) = match quanta {
+        Some(quanta) => {
+            let best = found.into_iter().next().unwrap_or_default();
+            let found = in_quanta(&mut placement, best, quanta, count.most);
+            let found = found.ok_or_else(|| ConeError::NoQuanta {
+                quantum: cones.quantum.radians(),
+                total: given.total.unwrap_or(0.0),
+                count: count.most,
+            })?;
+            (vec![found], Rule::Fixed)
+        }
+        None => (found, Rule::Best),
     };
+    let mut found = settle(&mut placement, found, rule, search);
+    // A thousand times what may add up.
+    if rule == Rule::Best && !placement.limits.are_met(&found.curvature, 1e3 * ROUNDING) {
+        found = placement.equal(count);
+    }
     let cone = |(&v, &curvature): (&usize, &f64)| {
         let vertex = VertexId::new(v);
         RequestedCone {
@@ -150,139 +181,144 @@ pub(super) fn select(
             curvature,
         }
     };
-    let cones = vertices.iter().zip(&curvature).map(cone);
+    let cones = found.vertices.iter().zip(&found.curvature).map(cone);
     Ok(cones
         .filter(|cone| cone.curvature.abs() > ROUNDING)
         .collect())
 }
 
-/// What is searched for.
-struct Search<'a> {
-    mesh: &'a Mesh,
-    cones: &'a ConeParams,
-    least: usize,
-    most: usize,
-    quanta: Option<Quanta>,
+/// Whole quanta near some cones: among them, the places of a first pool, and then on rings.
+fn in_quanta(
+    placement: &mut Placement,
+    found: Cones,
+    quanta: Quanta,
+    count: usize,
+) -> Option<Cones> {
+    let mut places = found.vertices.clone();
+    let others = placement.first_pool(count).vertices;
+    places.extend(others.into_iter().filter(|v| !found.vertices.contains(v)));
+    let u = placement.log_scale_of(&found.vertices, &found.curvature);
+    let pool = pool::Pool::new(placement, places, &u);
+    let members: Vec<usize> = (0..found.vertices.len()).collect();
+    let start = pool.weigh(members, &found.curvature, Rule::Best);
+    // From the choice, and from the same without some of its cones, in whose stead others appear; and with smaller and smaller numbers of quanta at
+    // one cone, since a few large ones and many small ones are different surfaces.
+    let mut best: Option<pool::Set> = None;
+    for quanta in quanta.caps(count) {
+        for fewer in 0..=start.members.len().div_ceil(2) {
+            let start = pool.prune(start.clone(), start.members.len() - fewer);
+            let set = quanta.search(&pool, &start, count);
+            best = set
+                .into_iter()
+                .chain(best)
+                .min_by(|a, b| a.value.total_cmp(&b.value));
+        }
+    }
+    let set = best?;
+    let mut found = approached(placement, &pool, set);
+    // Once more in a pool of what the force wants now, as long as that gains.
+    for _ in 0..LOOKS {
+        let mut places = found.vertices.clone();
+        places.extend(pool.vertices.iter().filter(|v| !found.vertices.contains(v)));
+        let now = std::slice::from_ref(&found);
+        let (wider, starts) = placement.widened_around(places, now, count, Rule::Fixed);
+        let Some(start) = starts.first() else { break };
+        let Some(set) = quanta.search(&wider, start, count) else {
+            break;
+        };
+        if set.value > start.value * (1.0 - search::ROUND_GAIN) {
+            break;
+        }
+        found = approached(placement, &wider, set);
+    }
+    Some(found)
 }
 
-impl Search<'_> {
-    /// The best cones within the limits of the placement; `None` where no whole quanta meet the total.
-    fn run(&self, placement: &mut Placement) -> Result<Vec<Found>, ConeError> {
-        let objective = self.cones.objective;
-        let is_start = objective == ConeObjective::AreaDistortion
-            && self.quanta.is_none()
-            && self.cones.log_scale_bound.is_none();
-        let choice = match self.cones.log_scale_bound {
-            Some(bound) => placement.search_bounded(self.least, self.most, bound),
-            // What is moved by another measure needs no more.
-            None if is_start => placement.start(self.most),
-            None => placement.search(self.most),
-        };
-        let mut choice =
-            choice.ok_or_else(|| ConeError::not_chosen("places for cones cannot be told apart"))?;
-        if !is_start {
-            choice = placement.drop_idle(choice, self.least);
-        }
-        let mut found = Found {
-            vertices: choice.vertices(),
-            curvature: choice.best.curvature.clone(),
-            cost: choice.energy,
-            distortion: 0.0,
-        };
-        if found.vertices.is_empty() {
-            return Ok(vec![found]);
-        }
-        if let Some(quanta) = self.quanta {
-            return Ok(self.in_quanta(placement, &choice, quanta));
-        }
-        let rule = Rule::Best(placement.limits);
-        if objective == ConeObjective::AreaDistortion {
-            let start = placement.arrangement(&found.vertices, &found.curvature, rule);
-            let moved = placement.lower_distortion(self.mesh, start, rule);
-            found = placement.drop_idle_of(moved, self.least, rule).found();
-        }
-        Ok(vec![self.settle(placement, choice, found, rule)])
-    }
-
-    /// Whole quanta from a choice, and from the same without some of its cones, in whose stead others appear.
-    fn in_quanta(&self, placement: &mut Placement, choice: &Choice, quanta: Quanta) -> Vec<Found> {
-        let count = choice.sites.len();
-        let mut found = Vec::new();
-        for fewer in 0..=count.div_ceil(2) {
-            let start = placement.prune(choice.clone(), count - fewer.min(count));
-            let whole = start.and_then(|s| quantum::quantise(placement, &s, quanta, self.most));
-            let Some(mut whole) = whole else { continue };
-            if self.cones.objective == ConeObjective::AreaDistortion {
-                whole = quantum::lower_distortion(placement, self.mesh, whole, quanta);
-            } else {
-                let u = placement.log_scale_of(whole.vertices.iter().zip(&whole.curvature));
-                whole.distortion = placement.at(&u).value(&[], &[]);
-            }
-            found.push(whole);
-        }
-        found
-    }
-
-    /// Another look, with the log scale that the mesh really has in place of that of the linear picture: where that promised something else
-    /// (or the finest moves are still to come, for (9)), places and curvatures are improved near where they are, and kept if the mesh agrees that they are better.
-    fn settle(&self, placement: &mut Placement, choice: Choice, found: Found, rule: Rule) -> Found {
-        let objective = self.cones.objective;
-        let cost = |placement: &Placement, u: &[f64]| match objective {
-            ConeObjective::LogScale => placement.picture.variance(u),
-            ConeObjective::AreaDistortion => placement.at(u).value(&[], &[]),
-        };
-        let mut found = found;
-        let mut real = placement.real_log_scale(&found.vertices, &found.curvature);
-        let mut now = cost(placement, &real);
-        let is_as_promised = (now - found.cost).abs() <= AS_PROMISED * now;
-        if objective == ConeObjective::LogScale && is_as_promised {
-            return found;
-        }
-        if objective == ConeObjective::AreaDistortion {
-            // Strong cones may make the linear picture promise too much: then what it started from is better.
-            let (vertices, curvature) = (choice.vertices(), &choice.best.curvature);
-            let promised = placement.log_scale_of(vertices.iter().zip(curvature));
-            if cost(placement, &promised) < now {
-                let first = placement.real_log_scale(&vertices, curvature);
-                if cost(placement, &first) < now {
-                    now = cost(placement, &first);
-                    real = first;
-                    (found.vertices, found.curvature) = (vertices, curvature.clone());
-                }
-            }
-        }
-        let (vertices, curvature) = (&found.vertices, &found.curvature);
-        placement.correct(vertices, curvature, &real);
-        let mut moved = match objective {
-            ConeObjective::LogScale => match placement.settle(choice) {
-                Some(choice) => Found {
-                    vertices: choice.vertices(),
-                    curvature: choice.best.curvature,
-                    cost: now,
-                    distortion: 0.0,
-                },
-                None => return found,
-            },
-            ConeObjective::AreaDistortion => {
-                let start = placement.arrangement(vertices, curvature, rule);
-                placement.near(self.mesh, start, rule, FINE).found()
-            }
-        };
-        let next = placement.real_log_scale(&moved.vertices, &moved.curvature);
-        moved.cost = cost(placement, &next);
-        if moved.cost < now { moved } else { found }
-    }
+/// Some places of a pool, moved on rings.
+fn approached(placement: &mut Placement, pool: &pool::Pool, set: pool::Set) -> Cones {
+    placement.approach(pool.cones(&set), &search::RADII, Rule::Fixed)
 }
 
-/// The fewest cones that can make up the total within the limits.
-fn least_count(limits: Limits) -> usize {
-    let [low, high] = limits.range;
-    let share = match limits.total {
-        Some(total) if total > ROUNDING => (total - ROUNDING) / high,
-        Some(total) if total < -ROUNDING => (total + ROUNDING) / low,
+/// Another look, with the log scale that the mesh really has in place of that of the linear picture: where that promised something else,
+/// places and curvatures are improved near where they are, and kept if the mesh agrees that they are better. On a small mesh, where strong cones
+/// stand for few faces each and the picture may be far off, all places are looked at anew as well, again and again as long as that gains.
+fn settle(
+    placement: &mut Placement,
+    optima: Vec<Cones>,
+    rule: Rule,
+    search: impl Fn(&mut Placement) -> Vec<Cones>,
+) -> Cones {
+    let is_small = placement.is_small() && rule == Rule::Best;
+    let mut best: Option<(f64, Vec<f64>, Cones)> = None;
+    for cones in optima {
+        let real = placement.real_log_scale(&cones.vertices, &cones.curvature);
+        let cost = placement.cost(&real);
+        if best.as_ref().is_none_or(|best| cost < best.0) {
+            best = Some((cost, real, cones));
+        }
+    }
+    let Some((mut now, mut real, mut found)) = best else {
+        return Cones::default();
+    };
+    let promised = placement.log_scale_of(&found.vertices, &found.curvature);
+    let as_promised = AS_PROMISED[usize::from(is_small)];
+    let off = (now - placement.cost(&promised)).abs();
+    if off <= as_promised * now || now <= NOTHING || now == f64::INFINITY {
+        return found;
+    }
+    for _ in 0..if is_small { LOOKS } else { 1 } {
+        placement.correct(&found.vertices, &found.curvature, &real);
+        let mut tried = vec![placement.approach(found.clone(), &SETTLED_RADII, rule)];
+        if is_small {
+            tried.extend(search(placement));
+        }
+        let before = now;
+        for cones in tried {
+            let u = placement.real_log_scale(&cones.vertices, &cones.curvature);
+            let cost = placement.cost(&u);
+            if cost < now {
+                (now, real, found) = (cost, u, cones);
+            }
+        }
+        if now >= before {
+            break;
+        }
+    }
+    found
+}
+
+/// The fewest cones that can make up a total within limits.
+fn least_count([low, high]: [f64; 2], total: f64) -> usize {
+    let share = match total {
+        _ if total > ROUNDING => (total - ROUNDING) / high,
+        _ if total < -ROUNDING => (total + ROUNDING) / low,
         _ => 0.0,
     };
     share.ceil() as usize
+}
+
+/// The fewest cones without which a boundary that takes what is left would have to take what is not its own: on a free boundary the curvature
+/// that the interior has, on one that shares what is left that of the handles.
+fn needed(
+    mesh: &Mesh,
+    topology: &Topology,
+    condition: BoundaryCondition,
+    range: [f64; 2],
+    given: &Given,
+) -> usize {
+    if topology.boundary_loops == 0 || given.total.is_some() {
+        return 0;
+    }
+    let left = match condition {
+        BoundaryCondition::Free => own_inside(mesh, topology),
+        _ => -2.0 * TAU * topology.genus as f64,
+    };
+    least_count(range, left)
+}
+
+/// The curvature that the interior of the surface has in space, radians.
+fn own_inside(mesh: &Mesh, topology: &Topology) -> f64 {
+    TAU * topology.euler_characteristic as f64 - boundary::own_total(mesh)
 }
 
 fn quanta(size: f64, limits: Limits) -> Result<Quanta, ConeError> {

@@ -10,23 +10,19 @@
 //! A surface with boundary is doubled, as in the flow; a field has one value a vertex of the surface. Where the boundary is free,
 //! u = 0 there and curvature need not add up to anything.
 
-use super::dot::dot;
+use super::star::Star;
 use crate::flow::cones::error::ConeError;
 use crate::flow::delaunay::Delaunay;
 use crate::flow::doubled::Doubled;
-use crate::flow::laplacian::{Hessian, System, Unknowns};
+use crate::flow::laplacian::{System, Unknowns};
 use crate::flow::metric::{Evaluation, Metric};
-use crate::flow::scale::moved;
 use crate::geometry::ids::{NONE, VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, triangle_area};
 
-/// Shift of the Laplacian in the difference quotient for self-energies; the area is 1. The relative error is the shift over the first
-/// eigenvalue (about 25 for a ball, 0.1 for a needle a hundred times as long as wide) and 1e-8 of rounding.
-const SHIFT: f64 = 1e-6;
 /// Looks at the curvature that a log scale really has, at most.
-const LOOKS: usize = 10;
+const LOOKS: usize = 4;
 /// Standard deviation of a step, relative to that of the log scale, after which the next would be far smaller.
-const REST: f64 = 1e-2;
+const REST: f64 = 3e-2;
 
 /// A surface's Laplacian, factorised, and its area.
 pub(super) struct Picture {
@@ -36,16 +32,14 @@ pub(super) struct Picture {
     original: VertexVec<VertexId>,
     /// 1 where the curvature of the double counts for one vertex of the surface, ½ on the boundary, 0 where u stays.
     share: Vec<f64>,
-    /// False where u = 0, by vertices of the double.
-    prescribed: VertexVec<bool>,
     /// Copies of the surface in the double: 1 or 2.
     copies: f64,
     /// Area of each vertex (a third of its faces), all together 1.
     pub(super) weight: Vec<f64>,
-    /// ∫ p_v² over the surface, where p_v is what [`Picture::solve`] answers to a unit of curvature at v.
-    square: Vec<f64>,
     /// K of the surface itself, radians.
     pub(super) curvature: Vec<f64>,
+    /// Of every vertex, in the Delaunay triangulation.
+    pub(super) star: Vec<Star>,
 }
 
 impl Picture {
@@ -91,7 +85,10 @@ impl Picture {
                 *diagonal *= 2.0;
             }
         }
-        let square = squares(&mut system, &laplacian, &area, copies)?;
+        let factorized = system
+            .solver
+            .factorize(&laplacian.diagonal, &laplacian.off_diagonal);
+        factorized.map_err(ConeError::not_chosen)?;
         let half = |v| {
             if surface.is_boundary_vertex(v) {
                 0.5
@@ -99,6 +96,19 @@ impl Picture {
                 1.0
             }
         };
+        let mut faces = vec![0; surface.vertex_count()];
+        let mut sum = vec![0.0; surface.vertex_count()];
+        for e in connectivity.edges() {
+            let ends = connectivity.edge_vertices(e).map(VertexId::index);
+            for v in ends.into_iter().filter(|&v| v < surface.vertex_count()) {
+                faces[v] += 1;
+                sum[v] += weight[e];
+            }
+        }
+        let vertices = surface.vertices();
+        let star =
+            vertices.map(|v| Star::new(faces[v.index()], evaluation.curvature[v], sum[v.index()]));
+        let star = star.collect();
         let vertices = surface.vertices();
         let curvature = vertices.map(|v| evaluation.curvature[v] * half(v));
         let vertices = surface.vertices();
@@ -107,12 +117,11 @@ impl Picture {
             curvature: curvature.collect(),
             share: share.collect(),
             original,
-            prescribed,
             system,
             copies,
             weight: area,
-            square,
             delaunay,
+            star,
         })
     }
 
@@ -143,90 +152,52 @@ impl Picture {
         }
     }
 
-    /// For every vertex the variance of the log scale that a unit of curvature there causes, taken from `sink` (adding up to 1, or empty
-    /// where the boundary is free).
-    ///
-    /// That log scale is p_v − q with q the answer to the sink, but for a constant, so its variance is
-    /// ∫ p_v² − 2 ∫ p_v q + ∫ q² − (mean p_v − mean q)². All p_v together: ∫ p_v q is what q, as a density, gets for an answer at v, and
-    /// the mean of p_v what the area itself gets.
-    pub(super) fn self_energies(&mut self, sink: &[f64]) -> Vec<f64> {
-        let mut mean = self.weight.clone();
-        self.solve(&mut mean);
-        let mut q = match sink.is_empty() {
-            true => vec![0.0; self.len()],
-            false => sink.to_vec(),
-        };
-        self.solve(&mut q);
-        let mean_q = self.mean(&q);
-        let mut product: Vec<f64> = q.iter().zip(&self.weight).map(|(q, w)| q * w).collect();
-        let square_q: f64 = q.iter().zip(&product).map(|(q, p)| q * p).sum();
-        self.solve(&mut product);
-        let terms = self.square.iter().zip(&product).zip(&mean);
-        terms
-            .map(|((square, product), mean)| {
-                square - 2.0 * product + square_q - (mean - mean_q).powi(2)
-            })
-            .collect()
+    /// What the stars of all vertices add to the log scale for changes of curvature, radians.
+    pub(super) fn bent(&self, change: &[f64]) -> Vec<f64> {
+        let changes = change.iter().zip(&self.share).zip(&self.star);
+        let bent = changes.map(|((change, share), star)| match *share > 0.0 {
+            true => star.bent(change / share),
+            false => 0.0,
+        });
+        bent.collect()
     }
 
-    /// The log scale for which the *mesh* has the curvature `target` (one a vertex, radians), from one near it, as far as some Newton steps
-    /// lead. Angles are those of the Delaunay triangulation at every u, and a step is taken when the energy fell, both as in the flow.
+    /// The log scale for which the *mesh* has the curvature `target` (one a vertex, radians), from one near it, as far as some steps with the
+    /// factor of the linear picture lead. Angles are those of the Delaunay triangulation at every u, as in the flow.
     pub(super) fn corrected(&mut self, start: &[f64], target: &[f64]) -> Vec<f64> {
-        let of = |&v: &VertexId| (target[v.index()], self.share[v.index()]);
-        let target: VertexVec<(f64, f64)> = self.original.iter().map(of).collect();
         let mut delaunay = self.delaunay.clone();
         let mut metric = Metric::flipping(&mut delaunay);
         let mut evaluation = Evaluation::default();
-        // The nearest so far, with the square of what is missing there; the direction from there, and how far it is tried.
-        let mut nearest = self.on_double(start);
-        let mut least = f64::INFINITY;
-        let mut direction = VertexVec::filled(0.0, nearest.len());
-        let mut length = 1.0;
-        let mut system = None;
+        // The nearest so far, the step from there, and how large it was.
+        let mut nearest = start.to_vec();
+        let mut step = vec![0.0; self.len()];
+        let (mut least, mut length) = (f64::INFINITY, 1.0);
         for _ in 0..LOOKS {
-            let u = moved(&nearest, &direction, length);
-            metric.evaluate(&u, &mut evaluation);
-            let reached = evaluation.curvature.iter().zip(target.iter());
-            let residual: VertexVec<f64> = reached
-                .map(|(k, &(target, share))| if share > 0.0 { k - target / share } else { 0.0 })
+            let u: Vec<f64> = nearest
+                .iter()
+                .zip(&step)
+                .map(|(u, s)| u + length * s)
                 .collect();
-            let error = dot(residual.as_slice(), residual.as_slice());
-            let slope = dot(residual.as_slice(), direction.as_slice());
-            if error.is_nan() || (slope > 0.0 && error > 0.8 * least) {
+            metric.evaluate(&self.on_double(&u), &mut evaluation);
+            let reached = evaluation.curvature.iter().zip(target).zip(&self.share);
+            let missing = reached.map(|((k, target), share)| match *share > 0.0 {
+                true => target - k * share,
+                false => 0.0,
+            });
+            let mut chord: Vec<f64> = missing.collect();
+            self.solve(&mut chord);
+            let size = self.variance(&chord);
+            if size.is_nan() || size >= least {
                 length *= 0.5;
                 continue;
             }
-            (nearest, least) = (u, least.min(error));
-            // The factor of the linear picture is good enough for a small step.
-            let mut chord: Vec<f64> = residual
-                .iter()
-                .take(self.len())
-                .zip(&self.share)
-                .map(|(r, share)| -r * share)
-                .collect();
-            self.solve(&mut chord);
-            let own = &nearest.as_slice()[..self.len()];
-            if self.variance(&chord) < REST * REST * self.variance(own) {
-                return own.iter().zip(&chord).map(|(u, step)| u + step).collect();
+            (nearest, step, least, length) = (u, chord, size, 1.0);
+            if size < REST * REST * self.variance(&nearest) {
+                nearest.iter_mut().zip(&step).for_each(|(u, s)| *u += s);
+                break;
             }
-            let unknowns = Unknowns {
-                connectivity: metric.connectivity(),
-                prescribed: &self.prescribed,
-                shares: &self.original,
-                scale_free: self.prescribed.iter().all(|&p| p),
-                flips: metric.flips(),
-            };
-            let Ok(mut fresh) = System::new(&unknowns, system.take()) else {
-                break;
-            };
-            let hessian = fresh.assemble(metric.connectivity(), &metric.edge_weights(&evaluation));
-            let Some(next) = fresh.direction(&hessian, 0.0, &residual) else {
-                break;
-            };
-            system = Some(fresh);
-            (direction, length) = (next, 1.0);
         }
-        nearest.as_slice()[..self.len()].to_vec()
+        nearest
     }
 
     /// A field of the surface on both its copies.
@@ -245,44 +216,6 @@ impl Picture {
         let squares = self.weight.iter().zip(field);
         squares.map(|(w, x)| w * (x - mean) * (x - mean)).sum()
     }
-
-    /// Replaces a field by the density of its difference from the mean: ∂/∂u of half the variance.
-    pub(super) fn centre(&self, field: &mut [f64]) {
-        let mean = self.mean(field);
-        for (x, w) in field.iter_mut().zip(&self.weight) {
-            *x = w * (*x - mean);
-        }
-    }
-}
-
-/// With M_t = M + t·area, ∂/∂t M_t⁻¹ = −M_t⁻¹ area M_t⁻¹, whose diagonal at t = 0 is wanted. M, unlike Δ, is regular. Leaves M
-/// factorised.
-fn squares(
-    system: &mut System,
-    matrix: &Hessian,
-    area: &[f64],
-    copies: f64,
-) -> Result<Vec<f64>, ConeError> {
-    let unknown: Vec<u32> = system.unknown.as_slice()[..area.len()].to_vec();
-    let mut inverse = |t: f64| -> Result<Vec<f64>, ConeError> {
-        let mut shifted = matrix.diagonal.clone();
-        for (&i, a) in unknown.iter().zip(area).filter(|(i, _)| **i != NONE) {
-            shifted[i as usize] += t * copies * a;
-        }
-        let solver = &mut system.solver;
-        let factorized = solver.factorize(&shifted, &matrix.off_diagonal);
-        factorized.map_err(ConeError::not_chosen)?;
-        let diagonal = solver.inverse_diagonal();
-        let at = |&i: &u32| match i {
-            NONE => 0.0,
-            i => copies * diagonal[i as usize],
-        };
-        Ok(unknown.iter().map(at).collect())
-    };
-    let less = inverse(SHIFT)?;
-    let whole = inverse(0.0)?;
-    let difference = whole.iter().zip(&less);
-    Ok(difference.map(|(a, b)| (a - b) / SHIFT).collect())
 }
 
 /// Area of the surface, squared source units.

@@ -1,40 +1,35 @@
 //! Curvatures that are multiples of a quantum.
 //!
-//! *Enters:* cones of any curvature. *Leaves:* cones whose curvatures are whole numbers of quanta, of either sign, with the same total.
+//! *Enters:* cones of any curvature in a pool of places. *Leaves:* cones whose curvatures are whole numbers of quanta, of either sign, with
+//! the same total.
 //!
-//! Integers take the problem out of convex programming; Li et al. 2022 round and re-optimise. Here the energy is a quadratic function
-//! with known columns, so local search is cheap: one quantum moves from one cone to another, a cone moves to another
-//! place, with or without giving a quantum to another cone, cones of nothing disappear and new ones of one quantum appear.
-//! Every step lowers the energy, so it ends.
+//! Integers take the problem out of convex programming; Li et al. 2022 round and re-optimise. Here the second-order model tells at
+//! once what each step gains: a quantum goes from one place of the pool to another, or a whole cone does, with or without giving a
+//! quantum away. Every step lowers the objective, so it ends.
 
-use super::area::Points;
-use super::arrangement::{Arrangement, Rule};
-use super::climb::climb;
-use super::found::Found;
-use super::moves::FINE;
-use super::placement::{Choice, Placement, Site};
-use super::quadratic::Limits;
-use crate::geometry::mesh::Mesh;
+use super::objective::NOTHING;
+use super::pool::{LEAST_GAIN, Pool, Rule, Set};
+use super::tableau::{Limits, Tableau};
 
-/// Share of the energy that a step must gain.
-const LEAST_GAIN: f64 = 1e-3;
-/// Rounds of moving cones and quanta for (9).
-const ROUNDS: usize = 4;
-/// Greatest numbers of quanta at a cone that are tried at most, the least first.
-const CAPS: usize = 4;
-/// Passes over all cones.
-const PASSES: usize = 8;
+/// Rounds of steps, each on a model of its own.
+const PASSES: usize = 16;
+
+/// Greatest numbers of quanta at a cone that are tried.
+const CAPS: usize = 3;
 
 /// Whole numbers of one quantum.
 #[derive(Clone, Copy)]
 pub(super) struct Quanta {
     /// One, radians.
-    pub(super) size: f64,
+    size: f64,
     /// Least and greatest number at a cone.
     range: [i64; 2],
     /// Their sum, where it is fixed.
     total: Option<i64>,
 }
+
+/// Numbers of quanta at the places of a pool.
+type Numbers = Vec<i64>;
 
 impl Quanta {
     /// `None` where the total is no whole number of quanta.
@@ -61,242 +56,142 @@ impl Quanta {
         })
     }
 
-    /// Limits with each greatest number of quanta at a cone that lets `count` cones meet the total.
-    pub(super) fn caps(self, count: usize) -> Vec<Limits> {
+    /// The same with each greatest number at a cone that lets `count` cones meet the total, the smallest first.
+    pub(super) fn caps(self, count: usize) -> Vec<Self> {
         let [low, high] = self.range;
-        let enough = |cap: i64| self.total.is_none_or(|total| cap * count as i64 >= total);
-        let total = self.total.map(|k| k as f64 * self.size);
-        (1..=high.max(1))
-            .filter(|&cap| cap <= high && enough(cap))
-            .take(CAPS)
-            .map(|cap| Limits {
-                range: [low as f64 * self.size, cap as f64 * self.size],
-                total,
-            })
-            .collect()
+        let enough = |cap: &i64| self.total.is_none_or(|total| cap * count as i64 >= total);
+        let caps = (1..=high.max(1)).filter(|cap| *cap <= high && enough(cap));
+        let capped = |cap: i64| Self {
+            range: [low, cap],
+            ..self
+        };
+        caps.take(CAPS).map(capped).collect()
     }
 
     fn allows(self, k: i64) -> bool {
         (self.range[0]..=self.range[1]).contains(&k)
     }
 
-    fn radians(self, k: &[i64]) -> Vec<f64> {
-        k.iter().map(|&k| k as f64 * self.size).collect()
+    /// Whole quanta with a low objective, at most `count` cones, from some cones of any curvature. `None` where the limits leave no way to meet the
+    /// total.
+    pub(super) fn search(self, pool: &Pool, start: &Set, count: usize) -> Option<Set> {
+        let mut numbers = self.rounded(pool, start, count)?;
+        let mut set = self.set(pool, &numbers);
+        for _ in 0..PASSES {
+            if set.value <= NOTHING {
+                break;
+            }
+            // All steps that the model wants; then fewer, if the objective disagrees.
+            let mut most = usize::MAX;
+            let better = loop {
+                let mut model = pool.model(&set, Rule::Fixed);
+                let mut next = numbers.clone();
+                let mut made = 0;
+                while made < most && self.step(&mut model, &mut next, count, set.value) {
+                    made += 1;
+                }
+                if made == 0 {
+                    break None;
+                }
+                let tried = self.set(pool, &next);
+                if tried.value < set.value * (1.0 - LEAST_GAIN) {
+                    break Some((next, tried));
+                }
+                if made == 1 {
+                    break None;
+                }
+                most = (made / 4).max(1);
+            };
+            match better {
+                Some(better) => (numbers, set) = better,
+                None => break,
+            }
+        }
+        Some(set)
     }
 
-    /// Changes by one quantum at one or two of `count` cones: from −1 and to +1, `None` where the rest of the surface gives or takes it.
-    fn transfers(self, count: usize) -> Vec<(Option<usize>, Option<usize>)> {
-        let ends: Vec<Option<usize>> = match self.total {
-            Some(_) => (0..count).map(Some).collect(),
-            None => (0..count).map(Some).chain([None]).collect(),
+    fn set(self, pool: &Pool, numbers: &Numbers) -> Set {
+        let members: Vec<usize> = (0..numbers.len()).filter(|&i| numbers[i] != 0).collect();
+        let curvature: Vec<f64> = members.iter().map(|&m| self.radians(numbers[m])).collect();
+        pool.weigh(members, &curvature, Rule::Fixed)
+    }
+
+    fn radians(self, k: i64) -> f64 {
+        k as f64 * self.size
+    }
+
+    /// Rounds, then adds or takes quanta where that costs least until the total is met.
+    fn rounded(self, pool: &Pool, start: &Set, count: usize) -> Option<Numbers> {
+        let [low, high] = self.range;
+        let mut numbers = vec![0; pool.len()];
+        for (&m, c) in start.members.iter().zip(&start.curvature) {
+            numbers[m] = ((c / self.size).round() as i64).clamp(low, high);
+        }
+        let Some(total) = self.total else {
+            return Some(numbers);
         };
-        let pairs = ends
-            .iter()
-            .flat_map(|&from| ends.iter().map(move |&to| (from, to)));
-        pairs.filter(|(from, to)| from != to).collect()
+        let mut model = pool.model(&self.set(pool, &numbers), Rule::Fixed);
+        loop {
+            let missing = total - numbers.iter().sum::<i64>();
+            if missing == 0 {
+                return Some(numbers);
+            }
+            let sign = missing.signum();
+            let is_full = numbers.iter().filter(|k| **k != 0).count() >= count;
+            let open = (0..pool.len())
+                .filter(|&j| self.allows(numbers[j] + sign) && !(is_full && numbers[j] == 0));
+            let amount = sign as f64 * self.size;
+            let cost = |j: usize| model.change(j, amount);
+            let best = open.min_by(|&i, &j| cost(i).total_cmp(&cost(j)))?;
+            numbers[best] += sign;
+            model.hold(best, self.radians(numbers[best]));
+        }
     }
 
-    /// The numbers after a transfer; `None` where it is not allowed.
-    fn transferred(self, k: &[i64], from: Option<usize>, to: Option<usize>) -> Option<Vec<i64>> {
-        let mut k = k.to_vec();
-        for (end, change) in [(from, -1), (to, 1)] {
-            if let Some(i) = end {
-                k[i] += change;
-                if !self.allows(k[i]) {
-                    return None;
+    /// The best step in the model; false where none gains enough.
+    fn step(self, model: &mut Tableau, numbers: &mut Numbers, count: usize, value: f64) -> bool {
+        let full = numbers.iter().filter(|k| **k != 0).count();
+        let keeps = |i: usize, a: i64, j: usize, b: i64| {
+            let new = usize::from(a != 0) + usize::from(b != 0);
+            let old = usize::from(numbers[i] != 0) + usize::from(numbers[j] != 0);
+            full + new - old <= count && self.allows(a) && self.allows(b)
+        };
+        let mut best = (-LEAST_GAIN * value, None);
+        for i in 0..numbers.len() {
+            for j in (0..numbers.len()).filter(|&j| j != i) {
+                // All of it, or one quantum.
+                for amount in [1, numbers[i]] {
+                    let (a, b) = (numbers[i] - amount, numbers[j] + amount);
+                    let is_nothing =
+                        amount == 0 || (numbers[i] == 0 && numbers[j] == 0 && full + 2 > count);
+                    if is_nothing || !keeps(i, a, j, b) {
+                        continue;
+                    }
+                    let change = model.shift(i, j, self.radians(amount));
+                    if change < best.0 {
+                        best = (change, Some([(i, a), (j, b)]));
+                    }
+                }
+            }
+            if self.total.is_none() {
+                for amount in [-1, 1, -numbers[i]] {
+                    let k = numbers[i] + amount;
+                    let new = full + usize::from(k != 0) - usize::from(numbers[i] != 0);
+                    if amount == 0 || new > count || !self.allows(k) {
+                        continue;
+                    }
+                    let change = model.change(i, self.radians(amount));
+                    if change < best.0 {
+                        best = (change, Some([(i, k), (i, k)]));
+                    }
                 }
             }
         }
-        Some(k)
-    }
-
-    /// Rounds, then moves quanta so that the total is met, each time where `energy` is least.
-    fn rounded(self, curvature: &[f64], energy: impl Fn(&[i64]) -> f64) -> Vec<i64> {
-        let [low, high] = self.range;
-        let near = |c: &f64| ((c / self.size).round() as i64).clamp(low, high);
-        let mut k: Vec<i64> = curvature.iter().map(near).collect();
-        let Some(total) = self.total else { return k };
-        loop {
-            let missing = total - k.iter().sum::<i64>();
-            let ends = (0..k.len()).map(|i| match missing > 0 {
-                true => (None, Some(i)),
-                false => (Some(i), None),
-            });
-            let next = ends
-                .filter_map(|(from, to)| self.transferred(&k, from, to))
-                .map(|k| (energy(&k), k))
-                .reduce(|a, b| if b.0 < a.0 { b } else { a });
-            match next {
-                Some((_, next)) if missing != 0 => k = next,
-                _ => return k,
-            }
+        let Some(changes) = best.1 else { return false };
+        for (i, k) in changes {
+            numbers[i] = k;
+            model.hold(i, self.radians(k));
         }
+        true
     }
-
-    /// The best transfer that lowers `energy` from `now` by enough.
-    fn best_transfer(
-        self,
-        k: &[i64],
-        now: f64,
-        energy: impl Fn(&[i64]) -> f64,
-    ) -> Option<(f64, Vec<i64>)> {
-        self.transfers(k.len())
-            .into_iter()
-            .filter_map(|(from, to)| self.transferred(k, from, to))
-            .map(|k| (energy(&k), k))
-            .reduce(|a, b| if b.0 < a.0 { b } else { a })
-            .filter(|(e, _)| *e < now * (1.0 - LEAST_GAIN))
-    }
-}
-
-/// Cones of whole quanta with little variance of the log scale, at most `count`: vertices and curvatures. `None` where the limits leave
-/// no way to meet the total.
-pub(super) fn quantise(
-    placement: &mut Placement,
-    choice: &Choice,
-    quanta: Quanta,
-    count: usize,
-) -> Option<Found> {
-    let mut sites = choice.sites.clone();
-    let of = |placement: &Placement, sites: &[Site], k: &[i64]| {
-        placement.energy(sites, &quanta.radians(k))
-    };
-    let mut k = quanta.rounded(&choice.best.curvature, |k| of(placement, &sites, k));
-    if quanta
-        .total
-        .is_some_and(|total| k.iter().sum::<i64>() != total)
-    {
-        return None;
-    }
-    let mut energy = of(placement, &sites, &k);
-    for _ in 0..PASSES {
-        let before = energy;
-        while let Some((e, next)) = quanta.best_transfer(&k, energy, |k| of(placement, &sites, k)) {
-            (energy, k) = (e, next);
-        }
-        let kept: Vec<bool> = k.iter().map(|&k| k != 0).collect();
-        let mut keep = kept.iter();
-        sites.retain(|_| keep.next().copied().unwrap_or(false));
-        k.retain(|&k| k != 0);
-        // The last is a cone that is not there yet.
-        let places = sites.len() + usize::from(sites.len() < count);
-        for i in 0..places {
-            let Some((vertex, numbers, promised)) = best_place(placement, &sites, &k, i, quanta)
-            else {
-                continue;
-            };
-            if promised >= energy * (1.0 - LEAST_GAIN) {
-                continue;
-            }
-            let mut moved = sites.clone();
-            moved.truncate(i);
-            moved.extend(placement.sites(&[vertex]));
-            moved.extend(sites.iter().skip(i + 1).cloned());
-            let e = of(placement, &moved, &numbers);
-            if e < energy * (1.0 - LEAST_GAIN) {
-                (energy, sites, k) = (e, moved, numbers);
-            }
-        }
-        if energy > before * (1.0 - LEAST_GAIN) {
-            break;
-        }
-    }
-    let mut cones: Vec<(usize, f64)> = sites
-        .iter()
-        .map(|s| s.vertex)
-        .zip(quanta.radians(&k))
-        .collect();
-    cones.retain(|(_, c)| *c != 0.0);
-    let (vertices, curvature) = cones.into_iter().unzip();
-    Some(Found {
-        vertices,
-        curvature,
-        cost: energy,
-        distortion: 0.0,
-    })
-}
-
-/// Where cone `i` would best be, with what numbers of quanta, and the energy then. `i` may be one past the last.
-fn best_place(
-    placement: &Placement,
-    sites: &[Site],
-    k: &[i64],
-    i: usize,
-    quanta: Quanta,
-) -> Option<(usize, Vec<i64>, f64)> {
-    let mut k = k.to_vec();
-    k.resize(k.len().max(i + 1), 0);
-    let stay = (k[i] != 0).then(|| k.clone());
-    let transfers = quanta.transfers(k.len()).into_iter();
-    let touching = transfers.filter(|(from, to)| *from == Some(i) || *to == Some(i));
-    let others: Vec<Site> = (0..sites.len())
-        .filter(|&j| j != i)
-        .map(|j| sites[j].clone())
-        .collect();
-    touching
-        .filter_map(|(from, to)| quanta.transferred(&k, from, to))
-        .chain(stay)
-        .filter(|k| k[i] != 0)
-        .filter_map(|k| {
-            let mut curvature = quanta.radians(&k);
-            let c = curvature.remove(i);
-            let rest = placement.energy(&others, &curvature);
-            let worth = |v: usize, _: &mut Vec<f64>| {
-                let e = placement.derivative(v, &others, &curvature);
-                -c * (2.0 * e + c * placement.self_energy[v])
-            };
-            let taken = |v: usize| !placement.allowed[v] || others.iter().any(|s| s.vertex == v);
-            let mut none = Vec::new();
-            let samples = placement.samples.iter().map(|&v| (v, worth(v, &mut none)));
-            let samples: Vec<(usize, f64)> = samples.collect();
-            let tops = climb(placement.connectivity, samples.into_iter(), taken, worth);
-            let &(vertex, gain) = tops.first()?;
-            Some((vertex, k, rest - gain))
-        })
-        .reduce(|a, b| if b.2 < a.2 { b } else { a })
-}
-
-/// Moves cones, and quanta between them, as long as that lowers (9).
-pub(super) fn lower_distortion(
-    placement: &mut Placement,
-    mesh: &Mesh,
-    mut found: Found,
-    quanta: Quanta,
-) -> Found {
-    found.cost = f64::INFINITY;
-    for _ in 0..ROUNDS {
-        let start = placement.arrangement(&found.vertices, &found.curvature, Rule::Fixed);
-        let now = placement.lower_distortion(mesh, start, Rule::Fixed);
-        let now = placement.near(mesh, now, Rule::Fixed, FINE);
-        if now.value() >= found.cost * (1.0 - LEAST_GAIN) {
-            break;
-        }
-        let curvature = transfer(placement.points(), &now, quanta);
-        found = now.found();
-        if curvature == found.curvature {
-            break;
-        }
-        found.curvature = curvature;
-        let kept: Vec<bool> = found.curvature.iter().map(|c| *c != 0.0).collect();
-        let mut keep = kept.iter();
-        (found.vertices).retain(|_| keep.next().copied().unwrap_or(true));
-        found.curvature.retain(|c| *c != 0.0);
-    }
-    found
-}
-
-/// Moves quanta between cones that stay where they are, as long as that lowers (9).
-fn transfer(points: Points, now: &Arrangement, quanta: Quanta) -> Vec<f64> {
-    let answers = now.answers();
-    let mut k: Vec<i64> = now
-        .curvature()
-        .iter()
-        .map(|c| (c / quanta.size).round() as i64)
-        .collect();
-    let value = |k: &[i64]| points.value(&answers, &quanta.radians(k));
-    let mut least = value(&k);
-    while let Some((reached, next)) = quanta.best_transfer(&k, least, value) {
-        (least, k) = (reached, next);
-    }
-    quanta.radians(&k)
 }

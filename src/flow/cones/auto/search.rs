@@ -1,278 +1,384 @@
-//! Cones with little variance of the log scale.
+//! Where cones are best: the best of a pool of places, then of places nearer and nearer to those.
 //!
-//! *Enters:* how many. *Leaves:* a choice that no move of one cone improves much.
+//! *Enters:* how many cones there may be. *Leaves:* vertices and curvatures.
 //!
-//! Greedy addition of the best vertex is Ben-Chen, Gotsman and Bunin 2008 with the least variance in place of the largest
-//! value; that few cones are enough is what Soliman, Slepčev and Crane 2018 and Fang et al. 2021 show with convex relaxations.
-//! Ours is the exact gain of every vertex, the exchange (each cone is taken away and put where it is worth most, until none wants to
-//! move) and the detours (more cones than asked for are exchanged too before the least valuable leave). *Not guaranteed:* the best of all choices.
+//! Where a little curvature would gain most is told by the force p = ∂J/∂K, one back-substitution for all vertices: it is
+//! smooth but at the cones, so it has few extremes. They make up the pool with the extremes of the log scale and places spread over the
+//! surface. A cone of curvature c at x feels the force −c ∇p(x), so the vertices to which it may move a little are those of some rings
+//! around x where c p is least, a few a ring, narrower and narrower rings. Because J is convex in the curvature, a move from x to y gains at most
+//! c (p(x) − p(y)): most places need not be looked at.
 
-use super::placement::{Choice, Placement};
+use super::candidates::{Samples, extremes};
+use super::placement::Placement;
+use super::pool::{Cones, LEAST_GAIN, Pool, Rule, Set};
+use crate::flow::cones::params::DEFAULT_COUNT;
+use crate::flow::cones::spread;
+use crate::geometry::ids::VertexId;
+use crate::geometry::mesh::{norm, sub, triangle_area};
 
-/// Share of the energy that an exchange must gain while the search looks for the right part of the surface …
-const COARSE_GAIN: f64 = 1e-2;
-/// … and at the end, for the right vertex: below this places differ by less than an edge.
-const FINE_GAIN: f64 = 1e-4;
-/// How many cones are added, as shares of their number, before as many are taken away again.
-const MORE: [f64; 3] = [1.0, 0.5, 0.25];
-/// The same at the least and at most.
-const MORE_CONES: [usize; 2] = [2, 8];
-/// How often that is gone through at most, until none of it helps.
-const CYCLES: usize = 2;
-/// A cone is idle that lowers the standard deviation of the log scale by less than this share …
-pub(super) const IDLE: f64 = 0.01;
-/// … and so is every one where it is below this without.
-pub(super) const NOTHING: f64 = 1e-6;
-/// Share of the energy that may be rounding.
-const ROUNDING: f64 = 1e-7;
-/// Vertices of all searches from a first cone of their own.
-const STARTS: usize = 20_000;
-/// Passes of exchanges over all cones, each of which must gain.
-const PASSES: usize = 24;
-/// The same where another search follows.
-const START_PASSES: usize = 2;
-/// Moves whose columns share one sweep of back-substitutions.
-const TOGETHER: usize = 8;
+/// Places spread over the surface, extremes of the log scale and of the force in the first pool at least, and for each cone wanted.
+const SPREAD: [f64; 2] = [24.0, 1.0];
+const EXTREMES: [f64; 2] = [16.0, 1.0];
+/// Rounds of widening the pool by extremes of the force, each of which must gain …
+const ROUNDS: usize = 2;
+/// … so much of the objective.
+pub(super) const ROUND_GAIN: f64 = 1e-2;
+/// Outer radii of the rings that cones move on, in square roots of the area.
+pub(super) const RADII: [f64; 3] = [0.24, 0.07, 0.02];
+/// How many of them many cones do without: they are as near to each other as these are wide.
+const WIDE: usize = 1;
+/// Local optima that are followed, and shares of the objective by which they may be worse than the best; on a small mesh more.
+const OPTIMA: [usize; 2] = [2, 8];
+const CLOSE: [f64; 2] = [0.05, 0.5];
+/// Cones up to which the wider rings are tried: many cones are as near to each other as these are wide.
+const FEW: usize = 48;
+/// Rings around a cone that are tried at once, each half as wide as the one before.
+const RINGS: usize = 3;
+/// Vertices of a ring that are tried, those first where the force is least, …
+const DIRECTIONS: usize = 2;
+/// … none nearer to another than this, in outer radii.
+const APART: f64 = 0.7;
+/// Rings that are tried at once at most, but one for each cone.
+const ALL_RINGS: usize = 96;
+/// Cones of which one at a time is looked at as idle.
+const MANY: usize = 32;
+/// Square root of the objective under which a cone is idle, whatever it gains.
+pub(super) const EVEN: f64 = 2e-6;
 
-/// A cone's move to one of some vertices.
-struct Move {
-    /// Which cone.
-    cone: usize,
-    /// The least energy that is promised.
-    energy: f64,
-    vertices: Vec<usize>,
+/// How many cones.
+#[derive(Clone, Copy)]
+pub(super) struct Count {
+    /// Needed to meet the total.
+    pub(super) least: usize,
+    /// As many as pay a little.
+    pub(super) wanted: usize,
+    /// As many as pay much.
+    pub(super) most: usize,
 }
 
+/// What one of eight cones must lower the square root of the objective by, as a share of it, to be kept …
+const PAYS: f64 = 0.01;
+/// … and beyond the number that is wanted, …
+const PAYS_MUCH: f64 = 0.04;
+/// … where that is above this: twice a standard deviation of the log scale of a quarter.
+const GOOD: f64 = 0.5;
+/// How many cones more are looked at together: one of several legs may gain little alone.
+const AHEAD: [usize; 3] = [2, 4, 8];
+
 impl Placement<'_> {
-    /// Moves cones one by one to where they are worth most, anywhere or (`nearby`) uphill from where they are, until none gains more than
-    /// `least_gain` of the energy.
-    fn exchange(&mut self, choice: Choice, least_gain: f64, nearby: bool) -> Choice {
-        self.exchange_at_most(PASSES, choice, least_gain, nearby)
+    /// Places that may be worth a cone beside none.
+    pub(super) fn first_pool(&mut self, count: usize) -> Pool {
+        let [spread, extreme] = [SPREAD, EXTREMES].map(|[least, each]| number(least, each, count));
+        let base = self.base.clone();
+        let level = self.mean(&base);
+        let force = self.force(&base);
+        let (c, allowed) = (self.connectivity, &self.allowed);
+        let regions = Samples::new(c, allowed, &base, spread);
+        let mut places = extremes(c, allowed, &base, level, &regions, extreme);
+        let middle = self.mean(&force);
+        places.extend(extremes(c, allowed, &force, middle, &regions, extreme));
+        places.extend(&regions.vertices);
+        unique(&mut places);
+        self.regions = regions;
+        // Cones will even out what is uneven now.
+        let even = vec![0.0; base.len()];
+        Pool::new(self, places, &even)
     }
 
-    fn exchange_at_most(
+    /// A pool of what is in one and of the extremes of the force that each of some sets makes, with the sets in it.
+    fn widened(&mut self, pool: &Pool, sets: &[Set], count: usize) -> (Pool, Vec<Set>) {
+        let cones: Vec<Cones> = sets.iter().map(|set| pool.cones(set)).collect();
+        self.widened_around(pool.vertices.clone(), &cones, count, Rule::Best)
+    }
+
+    /// A pool of some places, among them those of some sets of cones, and of the extremes of the force that each of these makes, with the sets
+    /// in it. The first set is the one that cells are made for.
+    pub(super) fn widened_around(
         &mut self,
-        passes: usize,
-        mut choice: Choice,
-        least_gain: f64,
-        nearby: bool,
-    ) -> Choice {
-        for _ in 0..passes {
-            let promised = self.promised_moves(&choice, least_gain, nearby);
-            let moved = promised
-                .chunks(TOGETHER)
-                .find_map(|some| self.make_moves(&choice, some, least_gain));
-            match moved {
-                Some(moved) => choice = moved,
-                None => break,
-            }
+        mut places: Vec<usize>,
+        sets: &[Cones],
+        count: usize,
+        rule: Rule,
+    ) -> (Pool, Vec<Set>) {
+        let extreme = number(EXTREMES[0], EXTREMES[1], count);
+        let mut near = None;
+        for cones in sets {
+            let u = self.log_scale_of(&cones.vertices, &cones.curvature);
+            let force = self.force(&u);
+            let share = 1.0 / cones.vertices.len().max(1) as f64;
+            let level: f64 = cones.vertices.iter().map(|&v| share * force[v]).sum();
+            places.extend(extremes(
+                self.connectivity,
+                &self.allowed,
+                &force,
+                level,
+                &self.regions,
+                extreme,
+            ));
+            near.get_or_insert(u);
         }
-        choice
+        unique(&mut places);
+        let pool = Pool::new(self, places, &near.unwrap_or_default());
+        let set =
+            |cones: &Cones| pool.weigh(pool.members_of(&cones.vertices), &cones.curvature, rule);
+        let sets = sets.iter().map(set).collect();
+        (pool, sets)
     }
 
-    /// What each cone alone promises to gain elsewhere, the best first, if it is more than `least_gain` of the energy.
-    fn promised_moves(&self, choice: &Choice, least_gain: f64, nearby: bool) -> Vec<Move> {
-        let goal = choice.energy * (1.0 - least_gain);
-        let moves = (0..choice.sites.len()).filter_map(|cone| {
-            let from = nearby.then(|| choice.sites[cone].vertex);
-            let mut found = self.best_additions(&self.without(choice, cone)?, from);
-            found.retain(|v| v.1 <= goal);
-            Some(Move {
-                cone,
-                energy: found.iter().map(|v| v.1).reduce(f64::min)?,
-                vertices: found.iter().map(|v| v.0).collect(),
-            })
-        });
-        let mut moves: Vec<Move> = moves.collect();
-        // Stable: of equals the first cone.
-        moves.sort_by(|a, b| a.energy.total_cmp(&b.energy));
-        moves
-    }
-
-    /// Makes those of some moves that gain enough one after another; `None` where none does.
-    fn make_moves(&mut self, choice: &Choice, moves: &[Move], least_gain: f64) -> Option<Choice> {
-        // All columns take one sweep of back-substitutions.
-        let columns: Vec<usize> = moves.iter().flat_map(|m| m.vertices.clone()).collect();
-        self.sites(&columns);
-        let mut best: Option<Choice> = None;
-        for Move { cone, vertices, .. } in moves {
-            let now = best.as_ref().unwrap_or(choice);
-            let goal = now.energy * (1.0 - least_gain);
-            // One that moved before may have come to the same place, or have made this move worthless.
-            let taken = |v: &usize| now.sites.iter().any(|s| s.vertex == *v);
-            let free: Vec<usize> = vertices.iter().copied().filter(|v| !taken(v)).collect();
-            let rest = self.without(now, *cone);
-            let moved = rest.and_then(|rest| self.with_one_of(&rest.sites, *cone, &free));
-            if let Some(moved) = moved.filter(|moved| moved.energy < goal) {
-                best = Some(moved);
-            }
-        }
-        best
-    }
-
-    /// `count` cones, or fewer where there are no more places.
-    ///
-    /// Exchange finds a local optimum. So more cones are added, all are exchanged, the least valuable are taken away, and what is
-    /// left is exchanged once more. Many more and few more lead out of different optima.
-    pub(super) fn search(&mut self, count: usize) -> Option<Choice> {
-        if count == 0 {
-            return self.choose(Vec::new());
-        }
-        let mut choice = self.first_choice(count, PASSES)?;
-        let [least, most] = MORE_CONES;
-        let more = |share: f64| ((share * count as f64) as usize).clamp(least, most);
-        let mut more: Vec<usize> = MORE.into_iter().map(more).collect();
-        more.dedup();
-        let mut in_vain = 0;
-        for &extra in more.iter().cycle().take(CYCLES * more.len()) {
-            let before = choice.energy;
-            choice = self.detour(choice, extra);
-            in_vain = if choice.energy < before {
-                0
-            } else {
-                in_vain + 1
-            };
-            // What did not help would do the same again.
-            if in_vain == more.len() {
+    /// Local optima of the objective that are hardly worse than the best, the best first; one at least.
+    pub(super) fn search(&mut self, count: Count) -> Vec<Cones> {
+        let mut pool = self.first_pool(count.wanted);
+        let kind = usize::from(self.is_small());
+        let mut sets = pool.best(count.wanted, OPTIMA[kind]);
+        let rounds = if count.wanted <= FEW { ROUNDS } else { 1 };
+        for _ in 0..rounds {
+            let before = lowest(&sets);
+            (pool, sets) = self.widened(&pool, &sets, count.wanted);
+            sets = pool.improved(sets, count.wanted, OPTIMA[kind]);
+            if lowest(&sets) > before * (1.0 - ROUND_GAIN) {
                 break;
             }
         }
-        Some(self.exchange(choice, FINE_GAIN, false))
-    }
-
-    /// `count` cones for another search to start from.
-    pub(super) fn start(&mut self, count: usize) -> Option<Choice> {
-        self.first_choice(count, START_PASSES)
-    }
-
-    /// Adds more cones, exchanges all, takes away as many, and exchanges what is left; keeps that if it is better.
-    fn detour(&mut self, choice: Choice, more: usize) -> Choice {
-        let count = choice.sites.len();
-        let many = self.grow(choice.clone(), count + more);
-        let many = self.exchange(many, COARSE_GAIN, false);
-        let mut other = many;
-        // Never less than half of them at once, and all others in their places before the next leave.
-        while other.sites.len() > count {
-            let fewer = count.max(other.sites.len().div_ceil(2));
-            let Some(fewer) = self.prune(other, fewer) else {
-                return choice;
-            };
-            other = self.exchange(fewer, COARSE_GAIN, false);
-        }
-        // Ways that end at the same places differ by rounding.
-        match other.energy < choice.energy * (1.0 - ROUNDING) {
-            true => other,
-            false => choice,
-        }
-    }
-
-    /// From nothing to cones that no single move improves much. On a small mesh, where that is cheap, the first cone is put at several places
-    /// in turn.
-    fn first_choice(&mut self, count: usize, passes: usize) -> Option<Choice> {
-        let starts = (STARTS / self.len().max(1)).min(self.samples.len());
-        let step = self.samples.len().div_ceil(starts.max(1)).max(1);
-        let firsts = self.samples.iter().copied().step_by(step).take(starts);
-        let mut starts = vec![Vec::new()];
-        for first in firsts.collect::<Vec<usize>>() {
-            starts.push(self.sites(&[first]));
-        }
-        let mut best: Option<Choice> = None;
-        for start in starts {
-            let Some(start) = self.choose(start) else {
-                continue;
-            };
-            let start = self.grow(start, count);
-            let choice = self.exchange_at_most(passes, start, COARSE_GAIN, false);
-            let is_better = |b: &Choice| choice.energy < b.energy * (1.0 - ROUNDING);
-            if best.as_ref().is_none_or(is_better) {
-                best = Some(choice);
+        let most = lowest(&sets) + CLOSE[kind] * lowest(&sets).abs();
+        // The first stays, whatever it is worth.
+        let worse = sets.iter().skip(1).position(|set| set.value > most);
+        sets.truncate(worse.map_or(sets.len(), |first| first + 1));
+        if let Some(first) = sets.first_mut() {
+            *first = more(&pool, first.clone(), count);
+            if first.members.len() > count.wanted {
+                // Fewer cones are no longer what is looked for.
+                sets.truncate(1);
             }
         }
-        best
-    }
-
-    /// Adds the best vertices, several at once as long as they are tops of different hills: what is not worth its place leaves by exchange.
-    fn grow(&mut self, mut choice: Choice, count: usize) -> Choice {
-        while choice.sites.len() < count {
-            let mut new = self.additions(&choice, None, TOGETHER);
-            // Stable: of equals the first found.
-            new.sort_by(|a, b| a.1.total_cmp(&b.1));
-            new.truncate(count - choice.sites.len());
-            let vertices: Vec<usize> = new.iter().map(|v| v.0).collect();
-            let mut sites = choice.sites.clone();
-            sites.extend(self.sites(&vertices));
-            match self.choose(sites) {
-                Some(next) if !vertices.is_empty() => choice = next,
-                _ => break,
+        let sets = sets.into_iter().map(|set| fewer(&pool, set, count));
+        let mut sets: Vec<Cones> = sets.map(|set| pool.cones(&set)).collect();
+        if !self.is_small() && sets.len() > 1 {
+            // Moving each costs more than what the mesh itself says of them.
+            let mut costs = Vec::with_capacity(sets.len());
+            for cones in sets {
+                let u = self.real_log_scale(&cones.vertices, &cones.curvature);
+                costs.push((self.cost(&u), cones));
             }
+            let best = costs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+            sets = best.into_iter().map(|(_, cones)| cones).collect();
         }
-        choice
-    }
-
-    /// Takes away the cones that are worth least, one by one, until `count` are left.
-    pub(super) fn prune(&self, mut choice: Choice, count: usize) -> Option<Choice> {
-        while choice.sites.len() > count {
-            choice = self.cheapest_removal(&choice)?;
-        }
-        Some(choice)
-    }
-
-    /// The best curvatures at these places and near them, after u without cones has changed.
-    pub(super) fn settle(&mut self, choice: Choice) -> Option<Choice> {
-        let weighed = self.choose(choice.sites)?;
-        Some(self.exchange(weighed, FINE_GAIN, true))
-    }
-
-    /// Takes away cones that do not pay, as long as more than `least` are left: those without which the standard deviation of the log
-    /// scale grows by less than a share of it, or stays nothing.
-    pub(super) fn drop_idle(&self, mut choice: Choice, least: usize) -> Choice {
-        while choice.sites.len() > least {
-            let Some(fewer) = self.cheapest_removal(&choice) else {
-                break;
+        let mut places: Vec<usize> = sets.iter().flat_map(|c| &c.vertices).copied().collect();
+        places.sort_unstable();
+        self.keep(&places);
+        let mut found = Vec::with_capacity(sets.len());
+        for cones in sets {
+            let radii = match cones.vertices.len() <= FEW {
+                true => &RADII[..],
+                false => &RADII[WIDE..],
             };
-            let (with, without) = (choice.deviation(), fewer.deviation());
-            if without > NOTHING && without > with * (1.0 + IDLE) {
-                break;
-            }
-            choice = fewer;
+            let cones = self.approach(cones, radii, Rule::Best);
+            let cones = self.without_idle(cones, count);
+            let u = self.log_scale_of(&cones.vertices, &cones.curvature);
+            found.push((self.cost(&u), cones));
         }
-        choice
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found.into_iter().map(|(_, cones)| cones).collect()
     }
 
-    /// The fewest cones, from `least` to `most`, with |u − mean| within `bound` on every face, or `most` of them.
-    pub(super) fn search_bounded(
-        &mut self,
-        least: usize,
-        most: usize,
-        bound: f64,
-    ) -> Option<Choice> {
-        let mut choice = self.search(least)?;
-        while self.largest_deviation(&choice) > bound && choice.sites.len() < most {
-            let Some(more) = self.add(&choice) else { break };
-            choice = self.exchange(more, COARSE_GAIN, false);
+    /// The fewest cones, as far as `count` allows, with |u − mean| within `bound` on every face.
+    pub(super) fn search_bounded(&mut self, count: Count, bound: f64) -> Vec<Cones> {
+        let mut tried = count.least.max(1);
+        loop {
+            let exactly = Count {
+                least: tried,
+                wanted: tried,
+                most: tried,
+            };
+            let mut found = self.search(exactly);
+            found.truncate(1);
+            let worst = found.iter().map(|cones| {
+                let u = self.log_scale_of(&cones.vertices, &cones.curvature);
+                self.largest_deviation(&u)
+            });
+            let worst = worst.fold(0.0, f64::max);
+            if worst <= bound || tried >= count.most {
+                return found;
+            }
+            // The deviation falls no faster than with the number of cones.
+            let step = if worst > 2.0 * bound { tried / 3 } else { 0 };
+            tried = (tried + step.max(1)).min(count.most);
         }
-        Some(self.exchange(choice, FINE_GAIN, false))
+    }
+
+    /// Equal cones far apart: for a surface of such extreme shape that nothing can be computed on it.
+    pub(super) fn equal(&self, count: Count) -> Cones {
+        let places = self.regions.vertices.iter().take(count.wanted.max(1));
+        let vertices: Vec<usize> = places.copied().collect();
+        let share = self.limits.total.unwrap_or(0.0) / vertices.len().max(1) as f64;
+        Cones {
+            curvature: vec![share; vertices.len()],
+            vertices,
+        }
     }
 
     /// max |u − mean| over the faces, u of a face being that of its corners on average.
-    fn largest_deviation(&mut self, choice: &Choice) -> f64 {
-        let vertices = choice.vertices();
-        let u = self.log_scale_of(vertices.iter().zip(&choice.best.curvature));
-        let mean = self.picture.mean(&u);
-        let faces = self.connectivity.faces();
-        faces
-            .map(|f| {
-                let corners = self.connectivity.face_vertices(f);
-                let own = corners.iter().map(|v| u[v.index()]).sum::<f64>() / 3.0;
-                (own - mean).abs()
-            })
-            .fold(0.0, f64::max)
+    fn largest_deviation(&self, u: &[f64]) -> f64 {
+        let mean = self.mean(u);
+        let c = self.connectivity;
+        let of = |corners: [VertexId; 3]| corners.iter().map(|v| u[v.index()]).sum::<f64>() / 3.0;
+        let faces = c.faces().map(|f| (of(c.face_vertices(f)) - mean).abs());
+        faces.fold(0.0, f64::max)
     }
 
-    /// Without the cone that is worth least.
-    pub(super) fn cheapest_removal(&self, choice: &Choice) -> Option<Choice> {
-        (0..choice.sites.len())
-            .filter_map(|i| self.without(choice, i))
-            .reduce(|a, b| if b.energy < a.energy { b } else { a })
+    /// Moves cones on rings of some radii around them.
+    pub(super) fn approach(&mut self, mut now: Cones, radii: &[f64], rule: Rule) -> Cones {
+        let size = self.area().sqrt();
+        for &radius in radii {
+            now = self.moved(now, radius * size, rule);
+        }
+        now
     }
+
+    /// One round of moves of all cones.
+    fn moved(&mut self, now: Cones, radius: f64, rule: Rule) -> Cones {
+        let u = self.log_scale_of(&now.vertices, &now.curvature);
+        let force = self.force(&u);
+        let worth = LEAST_GAIN * self.cost(&u);
+        let count = now.vertices.len();
+        let rings = (ALL_RINGS / count.max(1)).clamp(1, RINGS);
+        let mut places = now.vertices.clone();
+        let mut owner: Vec<usize> = (0..count).collect();
+        let mut taken: std::collections::BTreeSet<usize> = places.iter().copied().collect();
+        for (cone, (&v, c)) in now.vertices.iter().zip(&now.curvature).enumerate() {
+            let around = spread::around(self.mesh, VertexId::new(v), radius);
+            // The nearest vertices may be farther away than that.
+            let around: Vec<(usize, f64)> = match around.is_empty() {
+                true => {
+                    let ring = self.connectivity.neighbours(VertexId::new(v));
+                    ring.map(|w| (w.index(), 0.75 * radius)).collect()
+                }
+                false => around.iter().map(|(w, d)| (w.index(), *d)).collect(),
+            };
+            let mut outer = radius;
+            for ring in 0..rings {
+                // The last is a disk.
+                let inner = if ring + 1 == rings { 0.0 } else { 0.5 * outer };
+                let on = around.iter().filter(|(_, d)| (inner..=outer).contains(d));
+                let open = on
+                    .map(|(w, _)| *w)
+                    .filter(|w| self.allowed[*w] && !taken.contains(w));
+                let may_gain = |w: &usize| c * (force[v] - force[*w]) > worth;
+                let mut open: Vec<usize> = open.filter(may_gain).collect();
+                for _ in 0..DIRECTIONS {
+                    let lowest =
+                        |a: usize, b: usize| if c * force[b] < c * force[a] { b } else { a };
+                    let Some(best) = open.iter().copied().reduce(lowest) else {
+                        break;
+                    };
+                    taken.insert(best);
+                    places.push(best);
+                    owner.push(cone);
+                    let at = self.mesh.positions[VertexId::new(best)];
+                    let is_apart = |w: &usize| {
+                        let there = self.mesh.positions[VertexId::new(*w)];
+                        norm(sub(there, at)) > APART * outer
+                    };
+                    open.retain(is_apart);
+                }
+                outer *= 0.5;
+            }
+        }
+        if places.len() == count {
+            return now;
+        }
+        let pool = Pool::new(self, places, &u);
+        let set = pool.weigh((0..count).collect(), &now.curvature, rule);
+        let may = |i: usize, j: usize| owner[i] == owner[j];
+        let set = pool.exchange(set, rule, may);
+        pool.cones(&set)
+    }
+
+    fn area(&self) -> f64 {
+        let faces = self.connectivity.faces();
+        faces
+            .map(|f| triangle_area(self.mesh.face_positions(f)))
+            .sum()
+    }
+
+    fn without_idle(&mut self, cones: Cones, count: Count) -> Cones {
+        let u = self.log_scale_of(&cones.vertices, &cones.curvature);
+        let pool = Pool::new(self, cones.vertices, &u);
+        let all = (0..pool.len()).collect();
+        let set = pool.weigh(all, &cones.curvature, Rule::Best);
+        let set = fewer(&pool, set, count);
+        pool.cones(&set)
+    }
+}
+
+/// Beyond the number that is wanted, some more cones again and again, as long as each lowers much what is far from good.
+fn more(pool: &Pool, mut set: Set, count: Count) -> Set {
+    while set.value.sqrt() > GOOD {
+        let now = set.members.len();
+        let longer = AHEAD.into_iter().filter(|more| now + more <= count.most);
+        let better = longer.map(|more| {
+            let next = pool.grow(set.clone(), now + more);
+            let next = pool.exchange(next, Rule::Best, |_, _| true);
+            // From where these are, there may be no way to where so many more would be.
+            let anew = match more == AHEAD[2] {
+                true => pool.best(now + more, 1),
+                false => Vec::new(),
+            };
+            let anew = anew.into_iter().find(|anew| anew.value < next.value);
+            (more, anew.unwrap_or(next))
+        });
+        let mut better = better.filter(|(more, next)| {
+            let pays = PAYS_MUCH * share(now);
+            let goal = set.value.sqrt() * (1.0 - pays).powi(*more as i32);
+            next.members.len() <= now + more && next.value.sqrt() < goal
+        });
+        match better.next() {
+            Some((_, next)) => set = next,
+            None => break,
+        }
+    }
+    set
+}
+
+/// J of the best of some sets, the first.
+fn lowest(sets: &[Set]) -> f64 {
+    sets.first().map_or(f64::INFINITY, |set| set.value)
+}
+
+/// How much of what one of few cones must gain one of many must: each of twice as many gains half as much.
+fn share(count: usize) -> f64 {
+    (DEFAULT_COUNT as f64 / count.max(1) as f64).min(1.0)
+}
+
+/// Takes away cones that do not pay, as long as more than the least number are left.
+fn fewer(pool: &Pool, mut set: Set, count: Count) -> Set {
+    while set.members.len() > count.least {
+        let now = set.members.len();
+        // Of very many, some at a time.
+        let step = now.div_ceil(MANY).min(now - count.least);
+        let next = pool.prune(set.clone(), now - step);
+        let pays = share(set.members.len())
+            * match set.members.len() > count.wanted {
+                true => PAYS_MUCH,
+                false => PAYS,
+            };
+        let (with, without) = (set.value.max(0.0).sqrt(), next.value.max(0.0).sqrt());
+        if next.members.len() >= set.members.len()
+            || (without > EVEN && without > with * (1.0 + pays).powi(step as i32))
+        {
+            break;
+        }
+        set = next;
+    }
+    set
+}
+
+/// So many for each cone, but a least number.
+fn number(least: f64, each: f64, count: usize) -> usize {
+    least.max(each * count as f64) as usize
+}
+
+/// Keeps the first of equal places.
+fn unique(places: &mut Vec<usize>) {
+    let mut seen = std::collections::BTreeSet::new();
+    places.retain(|v| seen.insert(*v));
 }
