@@ -169,8 +169,9 @@ pub(super) fn select(
         None => (found, Rule::Best),
     };
     let mut found = settle(&mut placement, found, rule, search);
-    // A thousand times what may add up.
-    if rule == Rule::Best && !placement.limits.are_met(&found.curvature, 1e3 * ROUNDING) {
+    // A thousand times what may add up; and limits are wider where there are too few for them.
+    let are_met = placement.limits.are_met(&found.curvature, 1e3 * ROUNDING);
+    if rule == Rule::Best && (!are_met || found.vertices.len() < count.least) {
         found = placement.equal(count);
     }
     let cone = |(&v, &curvature): (&usize, &f64)| {
