@@ -240,7 +240,7 @@ fn approached(placement: &mut Placement, pool: &pool::Pool, set: pool::Set) -> C
     placement.approach(pool.cones(&set), &search::RADII, Rule::Fixed)
 }
 
-/// Another look, with the log scale that the mesh really has in place of that of the linear picture: where that promised something else,
+/// The optimum that is best by the log scale that the mesh really has; then another look, with that in place of the linear picture: where that promised something else,
 /// places and curvatures are improved near where they are, and kept if the mesh agrees that they are better. On a small mesh, where strong cones
 /// stand for few faces each and the picture may be far off, all places are looked at anew as well, again and again as long as that gains.
 fn settle(
