@@ -4,6 +4,7 @@
 //! cones, so the vertices around every place are points of their own; elsewhere it is smooth, and cells around the samples are enough.
 
 use super::candidates::Samples;
+use crate::flow::solve::{LANES, Row};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::VertexId;
 
@@ -17,6 +18,8 @@ const STEEPEST: f64 = 300.0;
 pub(super) struct Cells<'a> {
     /// Cell of every vertex.
     cell: Vec<u32>,
+    /// Cell and area of the vertices whose u is unknown, in the order of elimination.
+    ordered: Vec<(u32, f64)>,
     vertex_weight: &'a [f64],
     /// Area of every cell, all together 1.
     pub(super) weight: Vec<f64>,
@@ -27,6 +30,7 @@ impl<'a> Cells<'a> {
         connectivity: &Connectivity,
         samples: &Samples,
         vertex_weight: &'a [f64],
+        order: &[u32],
         places: &[usize],
     ) -> Self {
         let mut cell = samples.nearest.clone();
@@ -53,7 +57,9 @@ impl<'a> Cells<'a> {
         for (&c, w) in cell.iter().zip(vertex_weight) {
             weight[c as usize] += w;
         }
+        let ordered = order.iter().map(|&v| v as usize);
         Self {
+            ordered: ordered.map(|v| (cell[v], vertex_weight[v])).collect(),
             cell,
             vertex_weight,
             weight,
@@ -76,6 +82,20 @@ impl<'a> Cells<'a> {
     /// The cell of a vertex.
     pub(super) fn of(&self, vertex: usize) -> usize {
         self.cell[vertex] as usize
+    }
+
+    /// The means of several fields side by side, `factor` times, which are 0 at vertices whose u is known.
+    pub(super) fn means_of(&self, columns: &[Row], factor: f64) -> Vec<Row> {
+        let mut means = vec![[0.0; LANES]; self.weight.len()];
+        for (&(c, w), row) in self.ordered.iter().zip(columns) {
+            let mean = means[c as usize].iter_mut();
+            mean.zip(row).for_each(|(m, x)| *m += w * x);
+        }
+        for (row, w) in means.iter_mut().zip(&self.weight) {
+            let share = if *w > 0.0 { factor / w } else { 0.0 };
+            row.iter_mut().for_each(|m| *m *= share);
+        }
+        means
     }
 
     pub(super) fn means(&self, field: &[f64]) -> Vec<f64> {

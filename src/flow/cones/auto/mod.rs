@@ -207,7 +207,7 @@ fn in_quanta(
     let mut best: Option<pool::Set> = None;
     for quanta in quanta.caps(count) {
         for fewer in 0..=start.members.len().div_ceil(2) {
-            let start = pool.prune(start.clone(), start.members.len() - fewer);
+            let start = pool.prune(&start, start.members.len() - fewer);
             let set = quanta.search(&pool, &start, count);
             best = set
                 .into_iter()

@@ -162,9 +162,6 @@ impl Placement<'_> {
             let best = costs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
             sets = best.into_iter().map(|(_, cones)| cones).collect();
         }
-        let mut places: Vec<usize> = sets.iter().flat_map(|c| &c.vertices).copied().collect();
-        places.sort_unstable();
-        self.keep(&places);
         let mut found = Vec::with_capacity(sets.len());
         for cones in sets {
             let radii = match cones.vertices.len() <= FEW {
@@ -286,6 +283,7 @@ impl Placement<'_> {
         if places.len() == count {
             return now;
         }
+        self.keep(&now.vertices);
         let pool = Pool::new(self, places, &u);
         let set = pool.weigh((0..count).collect(), &now.curvature, rule);
         let may = |i: usize, j: usize| owner[i] == owner[j];
@@ -316,7 +314,7 @@ fn more(pool: &Pool, mut set: Set, count: Count) -> Set {
         let now = set.members.len();
         let longer = AHEAD.into_iter().filter(|more| now + more <= count.most);
         let better = longer.map(|more| {
-            let next = pool.grow(set.clone(), now + more);
+            let next = pool.grow(&set, now + more);
             let next = pool.exchange(next, Rule::Best, |_, _| true);
             // From where these are, there may be no way to where so many more would be.
             let anew = match more == AHEAD[2] {
@@ -355,7 +353,7 @@ fn fewer(pool: &Pool, mut set: Set, count: Count) -> Set {
         let now = set.members.len();
         // Of very many, some at a time.
         let step = now.div_ceil(MANY).min(now - count.least);
-        let next = pool.prune(set.clone(), now - step);
+        let next = pool.prune(&set, now - step);
         let pays = share(set.members.len())
             * match set.members.len() > count.wanted {
                 true => PAYS_MUCH,
