@@ -4,9 +4,8 @@
 //! cones, so the vertices around every place are points of their own; elsewhere it is smooth, and cells around the samples are enough.
 
 use super::candidates::Samples;
+use super::neighbours::Neighbours;
 use crate::flow::solve::{LANES, Row};
-use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::VertexId;
 
 /// Places up to which the second ring of vertices around them are points too; beyond, rings are the first.
 const WIDE: usize = 48;
@@ -27,7 +26,7 @@ pub(super) struct Cells<'a> {
 
 impl<'a> Cells<'a> {
     pub(super) fn new(
-        connectivity: &Connectivity,
+        neighbours: &Neighbours,
         samples: &Samples,
         vertex_weight: &'a [f64],
         order: &[u32],
@@ -36,20 +35,20 @@ impl<'a> Cells<'a> {
         let mut cell = samples.nearest.clone();
         let cells = samples.vertices.len() as u32;
         let mut count = cells;
-        let mut own = |v: VertexId| {
+        let mut own = |v: usize| {
             // A vertex that is alone already stays so.
-            let cell = &mut cell[v.index()];
+            let cell = &mut cell[v];
             if *cell < cells {
                 *cell = count;
                 count += 1;
             }
         };
         for &place in places {
-            own(VertexId::new(place));
-            for v in connectivity.neighbours(VertexId::new(place)) {
+            own(place);
+            for v in neighbours.of(place) {
                 own(v);
                 if places.len() <= WIDE {
-                    connectivity.neighbours(v).for_each(&mut own);
+                    neighbours.of(v).for_each(&mut own);
                 }
             }
         }

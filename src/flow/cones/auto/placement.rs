@@ -5,6 +5,7 @@
 
 use super::candidates::Samples;
 use super::cells::Cells;
+use super::neighbours::Neighbours;
 use super::objective::State;
 use super::picture::Picture;
 use super::star::Star;
@@ -31,6 +32,7 @@ struct Known {
 pub(super) struct Placement<'a> {
     pub(super) mesh: &'a Mesh,
     pub(super) connectivity: &'a Connectivity,
+    pub(super) neighbours: Neighbours,
     picture: Picture,
     /// Curvature without cones minus that of the surface, radians.
     background: Vec<f64>,
@@ -48,6 +50,8 @@ pub(super) struct Placement<'a> {
     pub(super) regions: Samples,
     /// The search comes back to the same places again and again.
     known: Vec<Known>,
+    /// Memory of columns that were forgotten.
+    spare: Vec<Vec<Row>>,
 }
 
 impl<'a> Placement<'a> {
@@ -71,14 +75,17 @@ impl<'a> Placement<'a> {
             picture.solve(&mut sunk);
         }
         let connectivity = &mesh.connectivity;
+        let neighbours = Neighbours::new(connectivity);
         let [each, least, most] = SAMPLES;
         let count = (base.len() / each).clamp(least, most);
         Self {
-            samples: Samples::new(connectivity, &allowed, &base, count),
+            samples: Samples::new(&neighbours, &allowed, &base, count),
             regions: Samples::none(),
             known: Vec::new(),
+            spare: Vec::new(),
             mesh,
             connectivity,
+            neighbours,
             picture,
             background,
             base,
@@ -144,21 +151,24 @@ impl<'a> Placement<'a> {
         self.picture.mean(field)
     }
 
-    /// The log scale that the mesh itself has with these cones.
-    pub(super) fn real_log_scale(&self, vertices: &[usize], curvature: &[f64]) -> Vec<f64> {
-        let linear = self.log_scale_of(vertices, curvature);
+    /// The log scale that the mesh itself has with these cones. `linear`: what the linear picture says.
+    pub(super) fn real_log_scale(
+        &self,
+        vertices: &[usize],
+        curvature: &[f64],
+        linear: &[f64],
+    ) -> Vec<f64> {
         let mut target: Vec<f64> = self.background.clone();
         self.add_cones(&mut target, vertices, curvature);
         let own = target.iter_mut().zip(&self.picture.curvature);
         own.for_each(|(t, k)| *t += k);
-        self.picture.corrected(&linear, &target)
+        self.picture.corrected(linear, &target)
     }
 
-    /// Counts from now on from what the mesh really does with these cones: adds to u without cones the difference between `real` and the linear
-    /// picture.
-    pub(super) fn correct(&mut self, vertices: &[usize], curvature: &[f64], real: &[f64]) {
-        let linear = self.log_scale_of(vertices, curvature);
-        let difference = real.iter().zip(&linear).map(|(r, l)| r - l);
+    /// Counts from now on from what the mesh really does with some cones: adds to u without cones the difference between `real` and `linear`,
+    /// what the linear picture says of them.
+    pub(super) fn correct(&mut self, real: &[f64], linear: &[f64]) {
+        let difference = real.iter().zip(linear).map(|(r, l)| r - l);
         let base = self.base.iter_mut().zip(difference);
         base.for_each(|(b, d)| *b += d);
     }
@@ -166,7 +176,7 @@ impl<'a> Placement<'a> {
     /// Cells around some places.
     pub(super) fn cells<'b>(&self, weight: &'b [f64], places: &[usize]) -> Cells<'b> {
         let order = &self.picture.order;
-        Cells::new(self.connectivity, &self.samples, weight, order, places)
+        Cells::new(&self.neighbours, &self.samples, weight, order, places)
     }
 
     /// The answer of each place: the log scale that a unit of curvature there causes, on average in every cell.
@@ -196,15 +206,16 @@ impl<'a> Placement<'a> {
         let mut new: Vec<usize> = new.difference(&known).copied().collect();
         // Neighbours in the order of elimination have most of the way to its end in common.
         new.sort_unstable_by_key(|&v| self.picture.position[v]);
-        let mut columns = Vec::new();
         for vertices in new.chunks(LANES) {
+            let mut columns = self.spare.pop().unwrap_or_default();
             self.picture.columns(vertices, &mut columns);
             take(vertices, &columns);
-            if (self.known.len() + 1) * columns.len() <= KNOWN / LANES {
-                self.known.push(Known {
+            match (self.known.len() + 1) * columns.len() <= KNOWN / LANES {
+                true => self.known.push(Known {
                     vertices: vertices.to_vec(),
-                    columns: std::mem::take(&mut columns),
-                });
+                    columns,
+                }),
+                false => self.spare.push(columns),
             }
         }
         let answers = places.iter().map(|v| answer.get(v).cloned());
@@ -213,8 +224,12 @@ impl<'a> Placement<'a> {
 
     /// Forgets all answers but those of some places, and of what is beside them.
     pub(super) fn keep(&mut self, places: &[usize]) {
-        let wanted = |known: &Known| known.vertices.iter().any(|v| places.contains(v));
-        self.known.retain(wanted);
+        for known in std::mem::take(&mut self.known) {
+            match known.vertices.iter().any(|v| places.contains(v)) {
+                true => self.known.push(known),
+                false => self.spare.push(known.columns),
+            }
+        }
     }
 
     /// ∂J/∂K of every vertex, at some log scale.
