@@ -252,7 +252,9 @@ fn settle(
     search: impl Fn(&mut Placement) -> Vec<Cones>,
 ) -> Cones {
     let is_small = placement.is_small() && rule == Rule::Best;
-    let optima = optima.into_iter().map(|cones| Outcome::new(placement, cones));
+    let optima = optima
+        .into_iter()
+        .map(|cones| Outcome::new(placement, cones));
     let mut now = match optima.min_by(|a, b| a.cost.total_cmp(&b.cost)) {
         Some(best) => best,
         None => return Cones::default(),

@@ -59,9 +59,11 @@ pub(super) struct State {
 
 impl State {
     pub(super) fn new(spread: [&[f64]; 2], u: &[f64]) -> Self {
-        let [least, most] = u.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &u| {
-            [a.min(u), b.max(u)]
-        });
+        let [least, most] = u
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &u| {
+                [a.min(u), b.max(u)]
+            });
         let mut grown: Vec<f64> = u.iter().map(|u| (2.0 * (u - most)).exp()).collect();
         // e^{−2u} is one over e^{2u}, where that is no number too small.
         let range = 2.0 * (most - least);

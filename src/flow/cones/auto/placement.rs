@@ -197,7 +197,12 @@ impl<'a> Placement<'a> {
                 }
             }
         };
-        let known: BTreeSet<usize> = self.known.iter().flat_map(|k| &k.vertices).copied().collect();
+        let known: BTreeSet<usize> = self
+            .known
+            .iter()
+            .flat_map(|k| &k.vertices)
+            .copied()
+            .collect();
         let wanted = |known: &&Known| known.vertices.iter().any(|v| places.contains(v));
         for known in self.known.iter().filter(wanted) {
             take(&known.vertices, &known.columns);

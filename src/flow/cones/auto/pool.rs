@@ -188,12 +188,7 @@ impl Pool {
     }
 
     /// Exchanges members for other places as long as that gains; `may`: which member may go to which place.
-    pub(super) fn exchange(
-        &self,
-        set: Set,
-        rule: Rule,
-        may: impl Fn(usize, usize) -> bool,
-    ) -> Set {
+    pub(super) fn exchange(&self, set: Set, rule: Rule, may: impl Fn(usize, usize) -> bool) -> Set {
         self.settled(set, rule, may).set
     }
 
