@@ -76,13 +76,14 @@ impl SymmetricSolver {
     }
 
     fn supernodes(&self) -> impl DoubleEndedIterator<Item = Supernode<'_>> {
-        let symbolic = match self.symbolic.raw() {
-            SymbolicCholeskyRaw::Supernodal(symbolic) if self.size > 0 => Some(symbolic),
-            // The other kind is never asked for.
-            _ => None,
+        let raw = self.symbolic.raw();
+        let count = match raw {
+            _ if self.size == 0 => 0,
+            SymbolicCholeskyRaw::Supernodal(symbolic) => symbolic.n_supernodes(),
+            SymbolicCholeskyRaw::Simplicial(_) => self.size,
         };
-        symbolic.into_iter().flat_map(|symbolic| {
-            (0..symbolic.n_supernodes()).map(|s| {
+        (0..count).map(move |s| match raw {
+            SymbolicCholeskyRaw::Supernodal(symbolic) => {
                 let start = symbolic.supernode_begin()[s] as usize;
                 let value = &symbolic.col_ptr_for_val()[s..];
                 Supernode {
@@ -91,7 +92,18 @@ impl SymmetricSolver {
                     below: symbolic.supernode(s).pattern(),
                     value: &self.factor[value[0] as usize..value[1] as usize],
                 }
-            })
+            }
+            // Of a matrix that is diagonal, whatever is asked for: every column by itself.
+            SymbolicCholeskyRaw::Simplicial(symbolic) => {
+                let column = &symbolic.col_ptr()[s..];
+                let [from, to] = [column[0] as usize, column[1] as usize];
+                Supernode {
+                    start: s,
+                    size: 1,
+                    below: &symbolic.row_idx()[from + 1..to],
+                    value: &self.factor[from..to],
+                }
+            }
         })
     }
 }
