@@ -9,9 +9,13 @@
 //! The factor is supernodal always: the crate's own threshold picks the simplicial one for small
 //! fill, which is slower above some ten thousand unknowns.
 
+mod columns;
+
+pub use columns::{LANES, Row};
+
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
-use faer::linalg::matmul::matmul;
+use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::solvers::Solve;
 use faer::perm::PermRef;
 use faer::sparse::linalg::SupernodalThreshold;
@@ -61,7 +65,23 @@ pub fn inner_products(columns: &[f64], count: usize) -> Vec<f64> {
     let a = MatRef::from_column_major_slice(&columns[..count * length], length, count);
     let mut products = vec![0.0; count * count];
     let into = MatMut::from_column_major_slice_mut(&mut products, count, count);
-    matmul(into, Accum::Replace, a.transpose(), a, 1.0, Par::Seq);
+    // Half of them, and then the other half.
+    triangular::matmul(
+        into,
+        BlockStructure::TriangularLower,
+        Accum::Replace,
+        a.transpose(),
+        BlockStructure::Rectangular,
+        a,
+        BlockStructure::Rectangular,
+        1.0,
+        Par::Seq,
+    );
+    for i in 0..count {
+        for j in 0..i {
+            products[i * count + j] = products[j * count + i];
+        }
+    }
     products
 }
 

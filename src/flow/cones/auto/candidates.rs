@@ -3,8 +3,8 @@
 //! *Enters:* fields on the surface. *Leaves:* vertices spread over it, vertices where a field is greater than around or less, vertices on
 //! rings around one. None depends on how vertices are numbered, unless values tie.
 
-use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{NONE, VertexId};
+use super::neighbours::Neighbours;
+use crate::geometry::ids::NONE;
 
 /// How far apart vertices are that are spread over a surface, in edges, where as many squares of that side would cover it: with this share
 /// they are at least as many as asked for.
@@ -26,7 +26,7 @@ impl Samples {
     }
 
     /// About `count` of those that are `allowed`, those of the lowest `order` first, none within some edges of another.
-    pub(super) fn new(c: &Connectivity, allowed: &[bool], order: &[f64], count: usize) -> Self {
+    pub(super) fn new(c: &Neighbours, allowed: &[bool], order: &[f64], count: usize) -> Self {
         let sorted = sorted(allowed, order);
         let vertices = match sorted.len() <= 2 * count {
             true => sorted,
@@ -43,11 +43,11 @@ fn sorted(allowed: &[bool], order: &[f64]) -> Vec<usize> {
     vertices
 }
 
-fn spread(c: &Connectivity, sorted: Vec<usize>, count: usize) -> Vec<usize> {
+fn spread(c: &Neighbours, sorted: Vec<usize>, count: usize) -> Vec<usize> {
     let apart = APART * (sorted.len() as f64 / count.max(1) as f64).sqrt();
     let radius = apart.round().max(1.0) as usize;
-    let mut is_near = vec![false; c.vertex_count()];
-    let mut seen = vec![NONE; c.vertex_count()];
+    let mut is_near = vec![false; c.len()];
+    let mut seen = vec![NONE; c.len()];
     let mut samples = Vec::new();
     for v in sorted {
         if is_near[v] {
@@ -56,14 +56,14 @@ fn spread(c: &Connectivity, sorted: Vec<usize>, count: usize) -> Vec<usize> {
         let mark = samples.len() as u32;
         samples.push(v);
         seen[v] = mark;
-        let mut ring = vec![VertexId::new(v)];
+        let mut ring = vec![v];
         for _ in 0..radius {
             let mut next = Vec::new();
             for &x in &ring {
-                for w in c.neighbours(x) {
-                    if std::mem::replace(&mut seen[w.index()], mark) != mark {
+                for w in c.of(x) {
+                    if std::mem::replace(&mut seen[w], mark) != mark {
                         next.push(w);
-                        is_near[w.index()] = true;
+                        is_near[w] = true;
                     }
                 }
             }
@@ -74,25 +74,25 @@ fn spread(c: &Connectivity, sorted: Vec<usize>, count: usize) -> Vec<usize> {
 }
 
 /// For every vertex the number of the source that is fewest edges away; the first of several. 0 where there is none.
-fn nearest_of(c: &Connectivity, sources: &[usize]) -> Vec<u32> {
-    let mut nearest = vec![NONE; c.vertex_count()];
-    let mut ring: Vec<VertexId> = Vec::new();
+fn nearest_of(c: &Neighbours, sources: &[usize]) -> Vec<u32> {
+    let mut nearest = vec![NONE; c.len()];
+    let mut ring: Vec<usize> = Vec::new();
     for (i, &v) in sources.iter().enumerate() {
         nearest[v] = i as u32;
-        ring.push(VertexId::new(v));
+        ring.push(v);
     }
-    let mut distance = vec![NONE; c.vertex_count()];
-    ring.iter().for_each(|v| distance[v.index()] = 0);
+    let mut distance = vec![NONE; c.len()];
+    ring.iter().for_each(|v| distance[*v] = 0);
     for step in 1.. {
         let mut next = Vec::new();
         for &v in &ring {
-            for w in c.neighbours(v).map(VertexId::index) {
+            for w in c.of(v) {
                 if distance[w] == NONE {
                     distance[w] = step;
-                    next.push(VertexId::new(w));
+                    next.push(w);
                 }
                 if distance[w] == step {
-                    nearest[w] = nearest[w].min(nearest[v.index()]);
+                    nearest[w] = nearest[w].min(nearest[v]);
                 }
             }
         }
@@ -110,7 +110,7 @@ fn nearest_of(c: &Connectivity, sources: &[usize]) -> Vec<u32> {
 /// At most `count` allowed vertices where a field is greater than around, or less; those first where it is farthest from `level`, one of
 /// each region before the second of any.
 pub(super) fn extremes(
-    c: &Connectivity,
+    c: &Neighbours,
     allowed: &[bool],
     field: &[f64],
     level: f64,
@@ -118,7 +118,7 @@ pub(super) fn extremes(
     count: usize,
 ) -> Vec<usize> {
     let is_extreme = |v: usize| {
-        let around = c.neighbours(VertexId::new(v)).map(|w| field[w.index()]);
+        let around = c.of(v).map(|w| field[w]);
         let [least, greatest] = around.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| {
             [a.min(x), b.max(x)]
         });

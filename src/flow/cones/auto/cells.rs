@@ -4,8 +4,8 @@
 //! cones, so the vertices around every place are points of their own; elsewhere it is smooth, and cells around the samples are enough.
 
 use super::candidates::Samples;
-use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::VertexId;
+use super::neighbours::Neighbours;
+use crate::flow::solve::{LANES, Row};
 
 /// Places up to which the second ring of vertices around them are points too; beyond, rings are the first.
 const WIDE: usize = 48;
@@ -17,6 +17,8 @@ const STEEPEST: f64 = 300.0;
 pub(super) struct Cells<'a> {
     /// Cell of every vertex.
     cell: Vec<u32>,
+    /// Cell and area of the vertices whose u is unknown, in the order of elimination.
+    ordered: Vec<(u32, f64)>,
     vertex_weight: &'a [f64],
     /// Area of every cell, all together 1.
     pub(super) weight: Vec<f64>,
@@ -24,28 +26,29 @@ pub(super) struct Cells<'a> {
 
 impl<'a> Cells<'a> {
     pub(super) fn new(
-        connectivity: &Connectivity,
+        neighbours: &Neighbours,
         samples: &Samples,
         vertex_weight: &'a [f64],
+        order: &[u32],
         places: &[usize],
     ) -> Self {
         let mut cell = samples.nearest.clone();
         let cells = samples.vertices.len() as u32;
         let mut count = cells;
-        let mut own = |v: VertexId| {
+        let mut own = |v: usize| {
             // A vertex that is alone already stays so.
-            let cell = &mut cell[v.index()];
+            let cell = &mut cell[v];
             if *cell < cells {
                 *cell = count;
                 count += 1;
             }
         };
         for &place in places {
-            own(VertexId::new(place));
-            for v in connectivity.neighbours(VertexId::new(place)) {
+            own(place);
+            for v in neighbours.of(place) {
                 own(v);
                 if places.len() <= WIDE {
-                    connectivity.neighbours(v).for_each(&mut own);
+                    neighbours.of(v).for_each(&mut own);
                 }
             }
         }
@@ -53,7 +56,9 @@ impl<'a> Cells<'a> {
         for (&c, w) in cell.iter().zip(vertex_weight) {
             weight[c as usize] += w;
         }
+        let ordered = order.iter().map(|&v| v as usize);
         Self {
+            ordered: ordered.map(|v| (cell[v], vertex_weight[v])).collect(),
             cell,
             vertex_weight,
             weight,
@@ -76,6 +81,20 @@ impl<'a> Cells<'a> {
     /// The cell of a vertex.
     pub(super) fn of(&self, vertex: usize) -> usize {
         self.cell[vertex] as usize
+    }
+
+    /// The means of several fields side by side, `factor` times, which are 0 at vertices whose u is known.
+    pub(super) fn means_of(&self, columns: &[Row], factor: f64) -> Vec<Row> {
+        let mut means = vec![[0.0; LANES]; self.weight.len()];
+        for (&(c, w), row) in self.ordered.iter().zip(columns) {
+            let mean = means[c as usize].iter_mut();
+            mean.zip(row).for_each(|(m, x)| *m += w * x);
+        }
+        for (row, w) in means.iter_mut().zip(&self.weight) {
+            let share = if *w > 0.0 { factor / w } else { 0.0 };
+            row.iter_mut().for_each(|m| *m *= share);
+        }
+        means
     }
 
     pub(super) fn means(&self, field: &[f64]) -> Vec<f64> {

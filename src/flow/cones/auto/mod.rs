@@ -9,7 +9,7 @@
 //! | what a cone does to its own vertex ([`star`]) | vertex scaling in a regular star | |
 //! | places for cones: where a little curvature gains most ([`candidates`], [`search`]) | conditional gradients on measures, Bredies and Pikkarainen 2013 | a pool of them |
 //! | the best few of them ([`pool`], [`tableau`]) | | every exchange read off one pivoted matrix |
-//! | cones moved on the surface ([`search`]) | Li et al. 2023 | rings of candidates along the force |
+//! | cones moved on the surface ([`moves`]) | Li et al. 2023 | rings of candidates along the force |
 //! | multiples of a quantum ([`quantum`]) | the aim of Li et al. 2022 | local search in the same model |
 //! | what the mesh really does ([`picture`]) | | some steps with the same factor |
 //!
@@ -22,6 +22,8 @@
 
 mod candidates;
 mod cells;
+mod moves;
+mod neighbours;
 mod objective;
 mod picture;
 mod placement;
@@ -207,7 +209,7 @@ fn in_quanta(
     let mut best: Option<pool::Set> = None;
     for quanta in quanta.caps(count) {
         for fewer in 0..=start.members.len().div_ceil(2) {
-            let start = pool.prune(start.clone(), start.members.len() - fewer);
+            let start = pool.prune(&start, start.members.len() - fewer);
             let set = quanta.search(&pool, &start, count);
             best = set
                 .into_iter()
@@ -237,7 +239,7 @@ fn in_quanta(
 
 /// Some places of a pool, moved on rings.
 fn approached(placement: &mut Placement, pool: &pool::Pool, set: pool::Set) -> Cones {
-    placement.approach(pool.cones(&set), &search::RADII, Rule::Fixed)
+    placement.approach(pool.cones(&set), &moves::RADII, Rule::Fixed)
 }
 
 /// The optimum that is best by the log scale that the mesh really has; then another look, with that in place of the linear picture: where that promised something else,
@@ -250,42 +252,60 @@ fn settle(
     search: impl Fn(&mut Placement) -> Vec<Cones>,
 ) -> Cones {
     let is_small = placement.is_small() && rule == Rule::Best;
-    let mut best: Option<(f64, Vec<f64>, Cones)> = None;
-    for cones in optima {
-        let real = placement.real_log_scale(&cones.vertices, &cones.curvature);
-        let cost = placement.cost(&real);
-        if best.as_ref().is_none_or(|best| cost < best.0) {
-            best = Some((cost, real, cones));
-        }
-    }
-    let Some((mut now, mut real, mut found)) = best else {
-        return Cones::default();
+    let optima = optima
+        .into_iter()
+        .map(|cones| Outcome::new(placement, cones));
+    let mut now = match optima.min_by(|a, b| a.cost.total_cmp(&b.cost)) {
+        Some(best) => best,
+        None => return Cones::default(),
     };
-    let promised = placement.log_scale_of(&found.vertices, &found.curvature);
     let as_promised = AS_PROMISED[usize::from(is_small)];
-    let off = (now - placement.cost(&promised)).abs();
-    if off <= as_promised * now || now <= NOTHING || now == f64::INFINITY {
-        return found;
+    let off = (now.cost - placement.cost(&now.linear)).abs();
+    if off <= as_promised * now.cost || now.cost <= NOTHING || now.cost == f64::INFINITY {
+        return now.cones;
     }
     for _ in 0..if is_small { LOOKS } else { 1 } {
-        placement.correct(&found.vertices, &found.curvature, &real);
-        let mut tried = vec![placement.approach(found.clone(), &SETTLED_RADII, rule)];
+        placement.correct(&now.real, &now.linear);
+        let mut tried = vec![placement.approach(now.cones.clone(), &SETTLED_RADII, rule)];
         if is_small {
             tried.extend(search(placement));
         }
-        let before = now;
+        let before = now.cost;
         for cones in tried {
-            let u = placement.real_log_scale(&cones.vertices, &cones.curvature);
-            let cost = placement.cost(&u);
-            if cost < now {
-                (now, real, found) = (cost, u, cones);
+            let there = Outcome::new(placement, cones);
+            if there.cost < now.cost {
+                now = there;
             }
         }
-        if now >= before {
+        if now.cost >= before {
             break;
         }
     }
-    found
+    now.cones
+}
+
+/// Cones and what they come to.
+struct Outcome {
+    cones: Cones,
+    /// Log scale of the linear picture.
+    linear: Vec<f64>,
+    /// Log scale that the mesh really has.
+    real: Vec<f64>,
+    /// J of that.
+    cost: f64,
+}
+
+impl Outcome {
+    fn new(placement: &Placement, cones: Cones) -> Self {
+        let linear = placement.log_scale_of(&cones.vertices, &cones.curvature);
+        let real = placement.real_log_scale(&cones.vertices, &cones.curvature, &linear);
+        Self {
+            cost: placement.cost(&real),
+            cones,
+            linear,
+            real,
+        }
+    }
 }
 
 /// The fewest cones that can make up a total within limits.

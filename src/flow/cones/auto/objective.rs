@@ -12,7 +12,6 @@
 use super::star::Star;
 use super::tableau::{Limits, Tableau};
 use crate::flow::solve::inner_products;
-use rayon::prelude::*;
 
 /// Newton steps at most.
 const STEPS: usize = 40;
@@ -22,6 +21,10 @@ pub(super) const SETTLED: f64 = 1e-9;
 pub(super) const COMPARED: f64 = 1e-4;
 /// Share of the variance's second derivative in the model where J is 1 or more.
 const BLEND: f64 = 0.5;
+/// Difference of two logarithms beyond which e to it times a share of an area is no ordinary number.
+const WIDEST: f64 = 300.0;
+/// Means of a tangent: over what grows, over what shrinks, over the area.
+const MEANS: usize = 3;
 /// Objective that is rounding.
 pub(super) const NOTHING: f64 = 1e-12;
 
@@ -46,15 +49,6 @@ pub(super) struct Answer {
     pub(super) star: Star,
 }
 
-impl Answer {
-    /// The tangent at some curvature.
-    fn at(&self, curvature: f64) -> Vec<f64> {
-        let mut field = self.field.clone();
-        field[self.own] += self.star.excess_slope(curvature);
-        field
-    }
-}
-
 /// The objective at one u.
 pub(super) struct State {
     /// J.
@@ -65,64 +59,84 @@ pub(super) struct State {
 
 impl State {
     pub(super) fn new(spread: [&[f64]; 2], u: &[f64]) -> Self {
-        let mut value = 0.0;
-        let shares = [0, 1].map(|side| {
-            let (sign, weight) = ([2.0, -2.0][side], spread[side]);
-            let top = u.iter().map(|u| sign * u).fold(f64::NEG_INFINITY, f64::max);
-            let parts = u
-                .iter()
-                .zip(weight)
-                .map(|(u, w)| w * (sign * u - top).exp());
-            let mut parts: Vec<f64> = parts.collect();
+        let [least, most] = u
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &u| {
+                [a.min(u), b.max(u)]
+            });
+        let mut grown: Vec<f64> = u.iter().map(|u| (2.0 * (u - most)).exp()).collect();
+        // e^{−2u} is one over e^{2u}, where that is no number too small.
+        let range = 2.0 * (most - least);
+        let mut shrunk: Vec<f64> = match range < WIDEST {
+            true => {
+                let scale = (-range).exp();
+                grown.iter().map(|e| scale / e).collect()
+            }
+            false => u.iter().map(|u| (2.0 * (least - u)).exp()).collect(),
+        };
+        let mut value = range;
+        for (parts, weight) in [&mut grown, &mut shrunk].into_iter().zip(spread) {
+            parts.iter_mut().zip(weight).for_each(|(p, w)| *p *= w);
             let sum: f64 = parts.iter().sum();
-            value += top + sum.ln();
+            value += sum.ln();
             parts.iter_mut().for_each(|p| *p /= sum);
-            parts
-        });
-        Self { value, shares }
+        }
+        Self {
+            value,
+            shares: [grown, shrunk],
+        }
     }
 
     /// ∂J/∂u of every point.
     pub(super) fn derivative(&self) -> Vec<f64> {
         let [grown, shrunk] = &self.shares;
-        grown
-            .iter()
-            .zip(shrunk)
-            .map(|(a, b)| 2.0 * (a - b))
-            .collect()
+        let both = grown.iter().zip(shrunk);
+        both.map(|(a, b)| 2.0 * (a - b)).collect()
     }
 
-    /// ∂J/∂c of some places.
-    fn slope(&self, answers: &[Vec<f64>]) -> Vec<f64> {
-        let by = self.derivative();
-        answers.par_iter().map(|g| dot(g, &by)).collect()
-    }
-
-    /// ∂²J/∂c² of some places, row by row, and `blend` times that of the variance fourfold.
-    fn bend(&self, answers: &[Vec<f64>], weight: &[f64], blend: f64) -> Vec<f64> {
-        let count = answers.len();
+    /// ∂J/∂c of some places with some curvatures; ∂²J/∂c², row by row, and `blend` times that of the variance fourfold.
+    fn derivatives(
+        &self,
+        answers: &[&Answer],
+        curvature: &[f64],
+        weight: &[f64],
+        blend: f64,
+    ) -> (Vec<f64>, Vec<f64>) {
+        let (count, points) = (answers.len(), weight.len());
         let [grown, shrunk] = &self.shares;
-        let even: Vec<f64> = weight.iter().map(|w| 2.0 * blend * w).collect();
-        let means: Vec<[f64; 3]> = answers
-            .par_iter()
-            .map(|g| [dot(g, grown), dot(g, shrunk), dot(g, weight)])
+        let both = grown.iter().zip(shrunk).zip(weight);
+        let root: Vec<f64> = both
+            .map(|((a, b), w)| (a + b + 2.0 * blend * w).sqrt())
             .collect();
-        let both = grown.iter().zip(shrunk).zip(&even);
-        let root: Vec<f64> = both.map(|((a, b), c)| (a + b + c).sqrt()).collect();
-        let with = |g: &Vec<f64>| g.iter().zip(&root).map(|(g, r)| g * r).collect();
-        let columns: Vec<Vec<f64>> = answers.par_iter().map(with).collect();
-        let mut matrix = inner_products(&columns.concat(), count);
-        for (row, a) in matrix.chunks_mut(count.max(1)).zip(&means) {
-            for (x, b) in row.iter_mut().zip(&means) {
-                *x = 4.0 * (*x - a[0] * b[0] - a[1] * b[1] - 2.0 * blend * a[2] * b[2]);
-            }
+        // Tangents times the root of what weighs their products; then what gives their means in the same products.
+        let all = count + MEANS;
+        let mut columns = Vec::with_capacity(all * points);
+        for (answer, c) in answers.iter().zip(curvature) {
+            let own = columns.len() + answer.own;
+            columns.extend(answer.field.iter().zip(&root).map(|(g, r)| g * r));
+            columns[own] += answer.star.excess_slope(*c) * root[answer.own];
         }
-        matrix
+        for of in [grown, shrunk, weight] {
+            let parts = of.iter().zip(&root);
+            columns.extend(parts.map(|(x, r)| if *r > 0.0 { x / r } else { 0.0 }));
+        }
+        let products = inner_products(&columns, all);
+        let mean = |i: usize| &products[i * all + count..][..MEANS];
+        let slope = (0..count).map(|i| 2.0 * (mean(i)[0] - mean(i)[1]));
+        let mut matrix = Vec::with_capacity(count * count);
+        for i in 0..count {
+            let a = mean(i);
+            matrix.extend((0..count).map(|j| {
+                let b = mean(j);
+                let means = a[0] * b[0] + a[1] * b[1] + 2.0 * blend * a[2] * b[2];
+                4.0 * (products[i * all + j] - means)
+            }));
+        }
+        (slope.collect(), matrix)
     }
 }
 
 /// Curvatures at given places, and what they lead to.
-#[derive(Clone)]
 pub(super) struct Weighed {
     /// Radians.
     pub(super) curvature: Vec<f64>,
@@ -151,12 +165,18 @@ impl Points<'_> {
     /// Where much is distorted, little area rules J and its second derivative, which then says nothing about the rest. The variance
     /// does, so a share of that is added, which falls with J: Newton's method with it converges, if more slowly.
     pub(super) fn model(&self, answers: &[&Answer], curvature: &[f64], limits: Limits) -> Tableau {
-        let state = self.state(answers, curvature);
+        self.model_at(&self.state(answers, curvature), answers, curvature, limits)
+    }
+
+    fn model_at(
+        &self,
+        state: &State,
+        answers: &[&Answer],
+        curvature: &[f64],
+        limits: Limits,
+    ) -> Tableau {
         let blend = BLEND * state.value.clamp(0.0, 1.0);
-        let tangents = answers.iter().zip(curvature).map(|(g, c)| g.at(*c));
-        let tangents: Vec<Vec<f64>> = tangents.collect();
-        let matrix = state.bend(&tangents, self.weight, blend);
-        let mut slope = state.slope(&tangents);
+        let (mut slope, matrix) = state.derivatives(answers, curvature, self.weight, blend);
         let rows = matrix.chunks(answers.len().max(1));
         for (slope, row) in slope.iter_mut().zip(rows) {
             *slope -= dot(row, curvature);
@@ -166,16 +186,19 @@ impl Points<'_> {
 
     /// Four times the variance of u, which J is where it is small, as a function of the curvatures; exact, so that no place for it need be near.
     pub(super) fn variance(&self, answers: &[&Answer], limits: Limits) -> Tableau {
-        let answers: Vec<Vec<f64>> = answers.iter().map(|g| g.at(0.0)).collect();
         let even = State {
             value: 0.0,
             shares: [self.weight.to_vec(), self.weight.to_vec()],
         };
+        let (_, matrix) = even.derivatives(answers, &vec![0.0; answers.len()], self.weight, 0.0);
         let mean = dot(self.base, self.weight);
         let by = self.base.iter().zip(self.weight);
         let by: Vec<f64> = by.map(|(u, w)| 8.0 * w * (u - mean)).collect();
-        let slope: Vec<f64> = answers.par_iter().map(|g| dot(g, &by)).collect();
-        Tableau::new(&even.bend(&answers, self.weight, 0.0), &slope, limits)
+        let slope = answers
+            .iter()
+            .map(|g| dot(&g.field, &by) + g.star.excess_slope(0.0) * by[g.own]);
+        let slope: Vec<f64> = slope.collect();
+        Tableau::new(&matrix, &slope, limits)
     }
 
     /// The best curvatures from some that are near; `settled`: gain of the last step.
@@ -186,50 +209,47 @@ impl Points<'_> {
         limits: Limits,
         settled: f64,
     ) -> Weighed {
-        let mut now = Weighed {
-            curvature: start.to_vec(),
-            value: self.state(answers, start).value,
-        };
+        let mut curvature = start.to_vec();
+        let mut state = self.state(answers, start);
         let mut is_feasible = limits.are_met(start, 1e-9);
         for _ in 0..STEPS {
-            let mut model = self.model(answers, &now.curvature, limits);
+            let mut model = self.model_at(&state, answers, &curvature, limits);
             for i in 0..answers.len() {
                 model.free(i);
             }
             model.settle();
             let next: Vec<f64> = (0..answers.len()).map(|i| model.curvature(i)).collect();
             // Where nearly nothing is left, J is rounding, but its derivative is not: the last step is not asked what it gains.
-            if is_feasible && now.value < NOTHING {
-                now.curvature = next;
-                now.value = self.state(answers, &now.curvature).value;
-                break;
-            }
+            let is_last = is_feasible && state.value < NOTHING;
             // Where the start keeps neither total nor limits there is nothing to compare with.
-            if !is_feasible {
-                now.value = self.state(answers, &next).value;
-                (now.curvature, is_feasible) = (next, true);
+            if is_last || !is_feasible {
+                state = self.state(answers, &next);
+                (curvature, is_feasible) = (next, true);
+                if is_last {
+                    break;
+                }
                 continue;
             }
-            let before = now.value;
+            let before = state.value;
             let mut length = 1.0;
             while length > 1e-3 {
-                let pairs = now.curvature.iter().zip(&next);
+                let pairs = curvature.iter().zip(&next);
                 let tried: Vec<f64> = pairs.map(|(c, d)| c + length * (d - c)).collect();
-                let value = self.state(answers, &tried).value;
-                if value < now.value {
-                    now = Weighed {
-                        curvature: tried,
-                        value,
-                    };
+                let there = self.state(answers, &tried);
+                if there.value < state.value {
+                    (curvature, state) = (tried, there);
                     break;
                 }
                 length *= 0.25;
             }
-            if before - now.value <= settled * before.max(NOTHING) {
+            if before - state.value <= settled * before.max(NOTHING) {
                 break;
             }
         }
-        now
+        Weighed {
+            curvature,
+            value: state.value,
+        }
     }
 }
 

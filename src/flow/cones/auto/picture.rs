@@ -1,7 +1,7 @@
 //! The linear picture: log scale as a linear function of curvature.
 //!
-//! *Enters:* a surface's connectivity and lengths, and where curvature is prescribed. *Leaves:* log scales for curvatures, one
-//! back-substitution each.
+//! *Enters:* a surface's connectivity and lengths, and where curvature is prescribed. *Leaves:* log scales for curvatures, a
+//! back-substitution each or several side by side.
 //!
 //! On a smooth surface the curvature measure of the metric e^{2u} g is exactly K + Δu (Δ ≥ 0), so u = Δ⁻¹(K̄ − K) is no
 //! approximation. On a mesh it is the first Newton step of vertex scaling from u = 0: Δ is the cotangent Laplacian of the
@@ -16,6 +16,7 @@ use crate::flow::delaunay::Delaunay;
 use crate::flow::doubled::Doubled;
 use crate::flow::laplacian::{System, Unknowns};
 use crate::flow::metric::{Evaluation, Metric};
+use crate::flow::solve::Row;
 use crate::geometry::ids::{NONE, VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, triangle_area};
 
@@ -33,7 +34,11 @@ pub(super) struct Picture {
     /// 1 where the curvature of the double counts for one vertex of the surface, ½ on the boundary, 0 where u stays.
     share: Vec<f64>,
     /// Copies of the surface in the double: 1 or 2.
-    copies: f64,
+    pub(super) copies: f64,
+    /// The vertices whose u is unknown, in the order of elimination.
+    pub(super) order: Vec<u32>,
+    /// Where each vertex stands in it.
+    pub(super) position: Vec<u32>,
     /// Area of each vertex (a third of its faces), all together 1.
     pub(super) weight: Vec<f64>,
     /// K of the surface itself, radians.
@@ -89,6 +94,16 @@ impl Picture {
             .solver
             .factorize(&laplacian.diagonal, &laplacian.off_diagonal);
         factorized.map_err(ConeError::not_chosen)?;
+        let positions = system.solver.positions();
+        let mut order = vec![NONE; positions.len()];
+        let mut position = vec![NONE; surface.vertex_count()];
+        for (v, at) in position.iter_mut().enumerate() {
+            // An unknown is one vertex of the surface, and its mirror image.
+            if let Some(&place) = positions.get(system.unknown.as_slice()[v] as usize) {
+                *at = place;
+                order[place as usize] = v as u32;
+            }
+        }
         let half = |v| {
             if surface.is_boundary_vertex(v) {
                 0.5
@@ -119,37 +134,33 @@ impl Picture {
             original,
             system,
             copies,
+            order,
+            position,
             weight: area,
             delaunay,
             star,
         })
     }
 
-    /// Number of vertices of the surface.
-    pub(super) fn len(&self) -> usize {
-        self.weight.len()
+    /// Replaces changes of curvature, radians, by the change of the log scale that they cause. Where no boundary is free they must add up to
+    /// 0, and the result is determined but for a constant. The fewer they are the quicker.
+    pub(super) fn solve(&self, field: &mut [f64]) {
+        let mut side = vec![0.0; self.order.len()];
+        for (x, &v) in side.iter_mut().zip(&self.order) {
+            *x = self.copies * field[v as usize];
+        }
+        self.system.solver.solve_ordered(&mut side);
+        field.fill(0.0);
+        for (x, &v) in side.iter().zip(&self.order) {
+            field[v as usize] = *x;
+        }
     }
 
-    /// Replaces changes of curvature, radians, one field after another, by the changes of the log scale that they cause. Where no
-    /// boundary is free each must add up to 0, and the result is determined but for a constant.
-    pub(super) fn solve(&mut self, fields: &mut [f64]) {
-        let n = self.len();
-        let size = self.system.solver.size();
-        let unknown = &self.system.unknown.as_slice()[..n];
-        let mut rhs = vec![0.0; fields.len() / n.max(1) * size];
-        for (field, rhs) in fields.chunks(n).zip(rhs.chunks_mut(size.max(1))) {
-            for (&i, &k) in unknown.iter().zip(field) {
-                if i != NONE {
-                    rhs[i as usize] = self.copies * k;
-                }
-            }
-        }
-        self.system.solver.solve(&mut rhs);
-        for (field, rhs) in fields.chunks_mut(n).zip(rhs.chunks(size.max(1))) {
-            for (&i, u) in unknown.iter().zip(field) {
-                *u = if i == NONE { 0.0 } else { rhs[i as usize] };
-            }
-        }
+    /// What a unit of curvature at each of at most [`LANES`](crate::flow::solve::LANES) vertices adds to the log scale, side by side, over
+    /// [`copies`](Self::copies); a row for each vertex of [`order`](Self::order).
+    pub(super) fn columns(&self, vertices: &[usize], columns: &mut Vec<Row>) {
+        let positions: Vec<u32> = vertices.iter().map(|&v| self.position[v]).collect();
+        self.system.solver.columns(&positions, columns);
     }
 
     /// What the stars of all vertices add to the log scale for changes of curvature, radians.
@@ -164,13 +175,13 @@ impl Picture {
 
     /// The log scale for which the *mesh* has the curvature `target` (one a vertex, radians), from one near it, as far as some steps with the
     /// factor of the linear picture lead. Angles are those of the Delaunay triangulation at every u, as in the flow.
-    pub(super) fn corrected(&mut self, start: &[f64], target: &[f64]) -> Vec<f64> {
+    pub(super) fn corrected(&self, start: &[f64], target: &[f64]) -> Vec<f64> {
         let mut delaunay = self.delaunay.clone();
         let mut metric = Metric::flipping(&mut delaunay);
         let mut evaluation = Evaluation::default();
         // The nearest so far, the step from there, and how large it was.
         let mut nearest = start.to_vec();
-        let mut step = vec![0.0; self.len()];
+        let mut step = vec![0.0; self.weight.len()];
         let (mut least, mut length) = (f64::INFINITY, 1.0);
         for _ in 0..LOOKS {
             let u: Vec<f64> = nearest

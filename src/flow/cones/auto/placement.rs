@@ -4,28 +4,35 @@
 //! vertex adds to it, and the force on cones: the derivative of the objective by curvature, for all vertices at once.
 
 use super::candidates::Samples;
+use super::cells::Cells;
+use super::neighbours::Neighbours;
 use super::objective::State;
 use super::picture::Picture;
 use super::star::Star;
 use super::tableau::Limits;
+use crate::flow::solve::{LANES, Row};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::mesh::Mesh;
-use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::collections::{BTreeMap, BTreeSet};
 
-/// Numbers in the answers that are kept.
+/// Numbers in the columns that are kept.
 const KNOWN: usize = 1 << 24;
 /// Cells of the surface: one for so many vertices, at least, and at most.
 const SAMPLES: [usize; 3] = [8, 500, 1000];
 /// Vertices of a small mesh.
 const SMALL: usize = 2000;
-/// Places that are answered side by side.
-const TOGETHER: usize = 32;
+
+/// Columns that were computed.
+struct Known {
+    vertices: Vec<usize>,
+    columns: Vec<Row>,
+}
 
 /// Cones to be chosen.
 pub(super) struct Placement<'a> {
     pub(super) mesh: &'a Mesh,
     pub(super) connectivity: &'a Connectivity,
+    pub(super) neighbours: Neighbours,
     picture: Picture,
     /// Curvature without cones minus that of the surface, radians.
     background: Vec<f64>,
@@ -41,8 +48,10 @@ pub(super) struct Placement<'a> {
     pub(super) samples: Samples,
     /// Regions of the surface, from each of which places for cones are taken.
     pub(super) regions: Samples,
-    /// Answers that were computed: the search comes back to the same places again and again.
-    known: BTreeMap<usize, Arc<[f64]>>,
+    /// The search comes back to the same places again and again.
+    known: Vec<Known>,
+    /// Memory of columns that were forgotten.
+    spare: Vec<Vec<Row>>,
 }
 
 impl<'a> Placement<'a> {
@@ -50,7 +59,7 @@ impl<'a> Placement<'a> {
     /// free.
     pub(super) fn new(
         mesh: &'a Mesh,
-        mut picture: Picture,
+        picture: Picture,
         background: Vec<f64>,
         sink: Vec<f64>,
         limits: Limits,
@@ -62,16 +71,21 @@ impl<'a> Placement<'a> {
             *u += bent;
         }
         let mut sunk = sink.clone();
-        picture.solve(&mut sunk);
+        if !sunk.is_empty() {
+            picture.solve(&mut sunk);
+        }
         let connectivity = &mesh.connectivity;
+        let neighbours = Neighbours::new(connectivity);
         let [each, least, most] = SAMPLES;
         let count = (base.len() / each).clamp(least, most);
         Self {
-            samples: Samples::new(connectivity, &allowed, &base, count),
+            samples: Samples::new(&neighbours, &allowed, &base, count),
             regions: Samples::none(),
-            known: BTreeMap::new(),
+            known: Vec::new(),
+            spare: Vec::new(),
             mesh,
             connectivity,
+            neighbours,
             picture,
             background,
             base,
@@ -121,7 +135,7 @@ impl<'a> Placement<'a> {
     }
 
     /// u of some cones.
-    pub(super) fn log_scale_of(&mut self, vertices: &[usize], curvature: &[f64]) -> Vec<f64> {
+    pub(super) fn log_scale_of(&self, vertices: &[usize], curvature: &[f64]) -> Vec<f64> {
         let mut field = vec![0.0; self.len()];
         self.add_cones(&mut field, vertices, curvature);
         self.picture.solve(&mut field);
@@ -137,67 +151,94 @@ impl<'a> Placement<'a> {
         self.picture.mean(field)
     }
 
-    /// The log scale that the mesh itself has with these cones.
-    pub(super) fn real_log_scale(&mut self, vertices: &[usize], curvature: &[f64]) -> Vec<f64> {
-        let linear = self.log_scale_of(vertices, curvature);
+    /// The log scale that the mesh itself has with these cones. `linear`: what the linear picture says.
+    pub(super) fn real_log_scale(
+        &self,
+        vertices: &[usize],
+        curvature: &[f64],
+        linear: &[f64],
+    ) -> Vec<f64> {
         let mut target: Vec<f64> = self.background.clone();
         self.add_cones(&mut target, vertices, curvature);
         let own = target.iter_mut().zip(&self.picture.curvature);
         own.for_each(|(t, k)| *t += k);
-        self.picture.corrected(&linear, &target)
+        self.picture.corrected(linear, &target)
     }
 
-    /// Counts from now on from what the mesh really does with these cones: adds to u without cones the difference between `real` and the linear
-    /// picture.
-    pub(super) fn correct(&mut self, vertices: &[usize], curvature: &[f64], real: &[f64]) {
-        let linear = self.log_scale_of(vertices, curvature);
-        let difference = real.iter().zip(&linear).map(|(r, l)| r - l);
+    /// Counts from now on from what the mesh really does with some cones: adds to u without cones the difference between `real` and `linear`,
+    /// what the linear picture says of them.
+    pub(super) fn correct(&mut self, real: &[f64], linear: &[f64]) {
+        let difference = real.iter().zip(linear).map(|(r, l)| r - l);
         let base = self.base.iter_mut().zip(difference);
         base.for_each(|(b, d)| *b += d);
     }
 
-    /// Hands the answer of each place (the log scale that a unit of curvature there causes) to `take`, in order.
-    pub(super) fn answer(&mut self, vertices: &[usize], mut take: impl FnMut(&[f64])) {
-        let n = self.len();
-        for some in vertices.chunks(TOGETHER) {
-            let is_new = |v: &usize| !self.known.contains_key(v);
-            let mut new: Vec<usize> = some.iter().copied().filter(is_new).collect();
-            new.sort_unstable();
-            new.dedup();
-            let mut fields = Vec::with_capacity(new.len() * n);
-            for &v in &new {
-                let from = fields.len();
-                fields.resize(from + n, 0.0);
-                fields[from + v] = 1.0;
-            }
-            self.picture.solve(&mut fields);
-            for field in fields.chunks_mut(n.max(1)) {
-                let sunk = field.iter_mut().zip(&self.sunk);
-                sunk.for_each(|(u, s)| *u -= s);
-            }
-            let fields = new.iter().copied().zip(fields.chunks(n.max(1)));
-            let fresh: BTreeMap<usize, &[f64]> = fields.collect();
-            for v in some {
-                match fresh.get(v) {
-                    Some(field) => take(field),
-                    None => take(self.known.get(v).map_or(&[][..], |known| known)),
+    /// Cells around some places.
+    pub(super) fn cells<'b>(&self, weight: &'b [f64], places: &[usize]) -> Cells<'b> {
+        let order = &self.picture.order;
+        Cells::new(&self.neighbours, &self.samples, weight, order, places)
+    }
+
+    /// The answer of each place: the log scale that a unit of curvature there causes, on average in every cell.
+    pub(super) fn answers(&mut self, places: &[usize], cells: &Cells) -> Vec<Vec<f64>> {
+        let sunk = match self.sunk.is_empty() {
+            true => vec![0.0; cells.weight.len()],
+            false => cells.means(&self.sunk),
+        };
+        let mut answer: BTreeMap<usize, Vec<f64>> =
+            places.iter().map(|&v| (v, Vec::new())).collect();
+        let copies = self.picture.copies;
+        let mut take = |vertices: &[usize], columns: &[Row]| {
+            let means = cells.means_of(columns, copies);
+            for (lane, v) in vertices.iter().enumerate() {
+                if let Some(answer) = answer.get_mut(v) {
+                    let means = means.iter().zip(&sunk);
+                    *answer = means.map(|(m, s)| m[lane] - s).collect();
                 }
             }
-            for (v, field) in fresh {
-                if (self.known.len() + 1) * n <= KNOWN {
-                    self.known.insert(v, Arc::from(field));
-                }
+        };
+        let known: BTreeSet<usize> = self
+            .known
+            .iter()
+            .flat_map(|k| &k.vertices)
+            .copied()
+            .collect();
+        let wanted = |known: &&Known| known.vertices.iter().any(|v| places.contains(v));
+        for known in self.known.iter().filter(wanted) {
+            take(&known.vertices, &known.columns);
+        }
+        let new: BTreeSet<usize> = places.iter().copied().collect();
+        let mut new: Vec<usize> = new.difference(&known).copied().collect();
+        // Neighbours in the order of elimination have most of the way to its end in common.
+        new.sort_unstable_by_key(|&v| self.picture.position[v]);
+        for vertices in new.chunks(LANES) {
+            let mut columns = self.spare.pop().unwrap_or_default();
+            self.picture.columns(vertices, &mut columns);
+            take(vertices, &columns);
+            match (self.known.len() + 1) * columns.len() <= KNOWN / LANES {
+                true => self.known.push(Known {
+                    vertices: vertices.to_vec(),
+                    columns,
+                }),
+                false => self.spare.push(columns),
+            }
+        }
+        let answers = places.iter().map(|v| answer.get(v).cloned());
+        answers.map(Option::unwrap_or_default).collect()
+    }
+
+    /// Forgets all answers but those of some places, and of what is beside them.
+    pub(super) fn keep(&mut self, places: &[usize]) {
+        for known in std::mem::take(&mut self.known) {
+            match known.vertices.iter().any(|v| places.contains(v)) {
+                true => self.known.push(known),
+                false => self.spare.push(known.columns),
             }
         }
     }
 
-    /// Forgets all answers but those of some places.
-    pub(super) fn keep(&mut self, vertices: &[usize]) {
-        self.known.retain(|v, _| vertices.contains(v));
-    }
-
     /// ∂J/∂K of every vertex, at some log scale.
-    pub(super) fn force(&mut self, u: &[f64]) -> Vec<f64> {
+    pub(super) fn force(&self, u: &[f64]) -> Vec<f64> {
         let mut force = State::new([self.weight(); 2], u).derivative();
         self.picture.solve(&mut force);
         if !self.sink.is_empty() {

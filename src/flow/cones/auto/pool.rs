@@ -4,7 +4,6 @@
 //! the second-order model of the objective, which a [`Tableau`] answers for all places at once. What comes out is weighed by the objective
 //! itself, and taken up if it is better.
 
-use super::cells::Cells;
 use super::objective::{Answer, COMPARED, NOTHING, Points, SETTLED};
 use super::placement::Placement;
 use super::tableau::{Limits, Tableau};
@@ -45,6 +44,12 @@ pub(super) struct Set {
     pub(super) value: f64,
 }
 
+/// Members that no exchange makes better, and the second-order model around them where it was made.
+struct Settled {
+    set: Set,
+    model: Option<Tableau>,
+}
+
 /// Chosen cones.
 #[derive(Clone, Default)]
 pub(super) struct Cones {
@@ -65,15 +70,9 @@ impl Pool {
     /// `near`: a log scale near those that will be looked at.
     pub(super) fn new(placement: &mut Placement, vertices: Vec<usize>, near: &[f64]) -> Self {
         let weight = placement.weight().to_vec();
-        let cells = Cells::new(
-            placement.connectivity,
-            &placement.samples,
-            &weight,
-            &vertices,
-        );
+        let cells = placement.cells(&weight, &vertices);
         let base = cells.means(&placement.base);
-        let mut answers = Vec::with_capacity(vertices.len());
-        placement.answer(&vertices, |field| answers.push(cells.means(field)));
+        let answers = placement.answers(&vertices, &cells);
         let answers = answers
             .into_iter()
             .zip(&vertices)
@@ -189,45 +188,55 @@ impl Pool {
     }
 
     /// Exchanges members for other places as long as that gains; `may`: which member may go to which place.
-    pub(super) fn exchange(
-        &self,
-        mut set: Set,
-        rule: Rule,
-        may: impl Fn(usize, usize) -> bool,
-    ) -> Set {
+    pub(super) fn exchange(&self, set: Set, rule: Rule, may: impl Fn(usize, usize) -> bool) -> Set {
+        self.settled(set, rule, may).set
+    }
+
+    fn settled(&self, mut set: Set, rule: Rule, may: impl Fn(usize, usize) -> bool) -> Settled {
         let [all, most, least] = PASSES;
         for _ in 0..(all / set.members.len().max(1)).clamp(least, most) {
             if set.value <= NOTHING {
                 break;
             }
             let model = self.model(&set, rule);
-            // All that the model wants; then less and less of it, if the objective disagrees.
-            let mut most = set.members.len().max(1);
-            let better = loop {
-                let (tried, made) = self.exchanged(model.clone(), set.value, rule, most, &may);
-                if made == 0 {
-                    break None;
-                }
-                let next = self.read(&tried, rule);
-                if next.value < set.value * (1.0 - LEAST_GAIN)
-                    && next.members.len() <= set.members.len()
-                {
-                    break Some(next);
-                }
-                most = made / 4;
-                if most == 0 {
-                    if made == 1 {
-                        break None;
-                    }
-                    most = 1;
-                }
-            };
-            match better {
+            match self.exchanged_once(&model, &set, rule, &may) {
                 Some(better) => set = better,
-                None => break,
+                None => {
+                    return Settled {
+                        set,
+                        model: Some(model),
+                    };
+                }
             }
         }
-        set
+        Settled { set, model: None }
+    }
+
+    /// All exchanges that the model wants; then less and less of it, if the objective disagrees. `None` where nothing gains.
+    fn exchanged_once(
+        &self,
+        model: &Tableau,
+        set: &Set,
+        rule: Rule,
+        may: &impl Fn(usize, usize) -> bool,
+    ) -> Option<Set> {
+        let mut most = set.members.len().max(1);
+        loop {
+            let (tried, made) = self.exchanged(model.clone(), set.value, rule, most, may);
+            if made == 0 {
+                return None;
+            }
+            let next = self.read(&tried, rule);
+            if next.value < set.value * (1.0 - LEAST_GAIN)
+                && next.members.len() <= set.members.len()
+            {
+                return Some(next);
+            }
+            most = match made {
+                1 => return None,
+                _ => (made / 4).max(1),
+            };
+        }
     }
 
     /// At most `most` exchanges in the model, each the best there is, and how many there were.
@@ -281,8 +290,8 @@ impl Pool {
     }
 
     /// Adds the places that gain most, until there are `count`.
-    pub(super) fn grow(&self, set: Set, count: usize) -> Set {
-        let model = self.model(&set, Rule::Best);
+    pub(super) fn grow(&self, set: &Set, count: usize) -> Set {
+        let model = self.model(set, Rule::Best);
         self.grown(model, set.members.len(), count)
     }
 
@@ -295,13 +304,13 @@ impl Pool {
         if count <= DETOURS[1] {
             let mut by_parts = self.weigh(Vec::new(), &[], Rule::Fixed);
             for part in PARTS {
-                by_parts = self.grow(by_parts, count.div_ceil(part));
+                by_parts = self.grow(&by_parts, count.div_ceil(part));
             }
             starts.push(by_parts);
             // On a small mesh, where that is cheap, each of several places is the first in turn.
             for first in (0..self.len()).take(STARTS / self.weight.len().max(1)) {
                 let first = self.weigh(vec![first], &[0.0], Rule::Best);
-                starts.push(self.grow(first, count));
+                starts.push(self.grow(&first, count));
             }
         }
         self.improved(starts, count, most)
@@ -309,7 +318,16 @@ impl Pool {
 
     /// Sets that were improved each, the best `most` first, without those that came to the same.
     pub(super) fn improved(&self, sets: Vec<Set>, count: usize, most: usize) -> Vec<Set> {
-        let sets = sets.into_iter().map(|set| self.improve(set, count));
+        let mut optima: Vec<Settled> = Vec::new();
+        for set in sets {
+            let optimum = self.settled(self.grow(&set, count), Rule::Best, |_, _| true);
+            // From the same places all goes on alike.
+            if !(optima.iter()).any(|other| other.set.members == optimum.set.members) {
+                optima.push(optimum);
+            }
+        }
+        let sets = optima.into_iter();
+        let sets = sets.map(|optimum| self.with_detours(optimum, count));
         let mut sets: Vec<Set> = sets.collect();
         sets.sort_by(|a, b| a.value.total_cmp(&b.value));
         sets.dedup_by(|a, b| a.members == b.members);
@@ -334,8 +352,11 @@ impl Pool {
     }
 
     /// Takes away the members that are worth least, until `count` are left.
-    pub(super) fn prune(&self, set: Set, count: usize) -> Set {
-        let mut model = self.model(&set, Rule::Best);
+    pub(super) fn prune(&self, set: &Set, count: usize) -> Set {
+        self.pruned(self.model(set, Rule::Best), count)
+    }
+
+    fn pruned(&self, mut model: Tableau, count: usize) -> Set {
         let mut now = (0..self.len()).filter(|&i| model.is_in(i)).count();
         while now > count {
             let members = (0..self.len()).filter(|&i| model.is_in(i));
@@ -352,13 +373,12 @@ impl Pool {
         self.read(&model, Rule::Best)
     }
 
-    /// `count` of the places, or fewer where there are no more, better than the set where that is possible.
+    /// `count` of the places, or fewer where there are no more, better than a local optimum of exchanges where that is possible.
     ///
-    /// Exchange finds a local optimum. So more cones are added, all are exchanged, the least valuable are taken away, and what is
-    /// left is exchanged once more. Many more and few more lead out of different optima.
-    pub(super) fn improve(&self, set: Set, count: usize) -> Set {
+    /// More cones are added, all are exchanged, the least valuable are taken away, and what is left is exchanged once more. Many more and few
+    /// more lead out of different optima.
+    fn with_detours(&self, mut best: Settled, count: usize) -> Set {
         let any = |_: usize, _: usize| true;
-        let mut best = self.exchange(self.grow(set, count), Rule::Best, any);
         let [least, most] = MORE_CONES;
         let detours = match count {
             _ if count <= DETOURS[1] => &MORE[..],
@@ -367,12 +387,22 @@ impl Pool {
         };
         for share in detours {
             let more = ((share * count as f64) as usize).clamp(least, most);
-            let many = self.exchange(self.grow(best.clone(), count + more), Rule::Best, any);
-            let few = self.exchange(self.prune(many, count), Rule::Best, any);
-            if few.members.len() <= count && few.value < best.value * (1.0 - LEAST_GAIN) {
+            let model = self.model_of(&mut best);
+            let many = self.grown(model, best.set.members.len(), count + more);
+            let mut many = self.settled(many, Rule::Best, any);
+            let few = self.pruned(self.model_of(&mut many), count);
+            let few = self.settled(few, Rule::Best, any);
+            let is_better = few.set.value < best.set.value * (1.0 - LEAST_GAIN);
+            if few.set.members.len() <= count && is_better {
                 best = few;
             }
         }
-        best
+        best.set
+    }
+
+    fn model_of(&self, settled: &mut Settled) -> Tableau {
+        let Settled { set, model } = settled;
+        let model = model.get_or_insert_with(|| self.model(set, Rule::Best));
+        model.clone()
     }
 }

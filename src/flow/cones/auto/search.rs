@@ -4,17 +4,14 @@
 //!
 //! Where a little curvature would gain most is told by the force p = ∂J/∂K, one back-substitution for all vertices: it is
 //! smooth but at the cones, so it has few extremes. They make up the pool with the extremes of the log scale and places spread over the
-//! surface. A cone of curvature c at x feels the force −c ∇p(x), so the vertices to which it may move a little are those of some rings
-//! around x where c p is least, a few a ring, narrower and narrower rings. Because J is convex in the curvature, a move from x to y gains at most
-//! c (p(x) − p(y)): most places need not be looked at.
+//! surface. The best of them are moved ([`moves`](super::moves)).
 
 use super::candidates::{Samples, extremes};
+use super::moves::RADII;
 use super::placement::Placement;
-use super::pool::{Cones, LEAST_GAIN, Pool, Rule, Set};
+use super::pool::{Cones, Pool, Rule, Set};
 use crate::flow::cones::params::DEFAULT_COUNT;
-use crate::flow::cones::spread;
 use crate::geometry::ids::VertexId;
-use crate::geometry::mesh::{norm, sub, triangle_area};
 
 /// Places spread over the surface, extremes of the log scale and of the force in the first pool at least, and for each cone wanted.
 const SPREAD: [f64; 2] = [24.0, 1.0];
@@ -23,23 +20,13 @@ const EXTREMES: [f64; 2] = [16.0, 1.0];
 const ROUNDS: usize = 2;
 /// … so much of the objective.
 pub(super) const ROUND_GAIN: f64 = 1e-2;
-/// Outer radii of the rings that cones move on, in square roots of the area.
-pub(super) const RADII: [f64; 3] = [0.24, 0.07, 0.02];
-/// How many of them many cones do without: they are as near to each other as these are wide.
+/// How many of the radii many cones do without: they are as near to each other as these are wide.
 const WIDE: usize = 1;
 /// Local optima that are followed, and shares of the objective by which they may be worse than the best; on a small mesh more.
 const OPTIMA: [usize; 2] = [2, 8];
 const CLOSE: [f64; 2] = [0.05, 0.5];
 /// Cones up to which the wider rings are tried: many cones are as near to each other as these are wide.
 const FEW: usize = 48;
-/// Rings around a cone that are tried at once, each half as wide as the one before.
-const RINGS: usize = 3;
-/// Vertices of a ring that are tried, those first where the force is least, …
-const DIRECTIONS: usize = 2;
-/// … none nearer to another than this, in outer radii.
-const APART: f64 = 0.7;
-/// Rings that are tried at once at most, but one for each cone.
-const ALL_RINGS: usize = 96;
 /// Cones of which one at a time is looked at as idle.
 const MANY: usize = 32;
 /// Square root of the objective under which a cone is idle, whatever it gains.
@@ -72,7 +59,7 @@ impl Placement<'_> {
         let base = self.base.clone();
         let level = self.mean(&base);
         let force = self.force(&base);
-        let (c, allowed) = (self.connectivity, &self.allowed);
+        let (c, allowed) = (&self.neighbours, &self.allowed);
         let regions = Samples::new(c, allowed, &base, spread);
         let mut places = extremes(c, allowed, &base, level, &regions, extreme);
         let middle = self.mean(&force);
@@ -108,7 +95,7 @@ impl Placement<'_> {
             let share = 1.0 / cones.vertices.len().max(1) as f64;
             let level: f64 = cones.vertices.iter().map(|&v| share * force[v]).sum();
             places.extend(extremes(
-                self.connectivity,
+                &self.neighbours,
                 &self.allowed,
                 &force,
                 level,
@@ -127,6 +114,17 @@ impl Placement<'_> {
 
     /// Local optima of the objective that are hardly worse than the best, the best first; one at least.
     pub(super) fn search(&mut self, count: Count) -> Vec<Cones> {
+        let optima = self.optima_of_a_pool(count);
+        let optima = match self.is_small() {
+            true => optima,
+            // Moving each costs more than what the mesh itself says of them.
+            false => self.really_best(optima),
+        };
+        self.all_moved(optima, count)
+    }
+
+    /// The first part: local optima among places of a pool that is widened as long as that pays, with as many cones as pay.
+    fn optima_of_a_pool(&mut self, count: Count) -> Vec<Cones> {
         let mut pool = self.first_pool(count.wanted);
         let kind = usize::from(self.is_small());
         let mut sets = pool.best(count.wanted, OPTIMA[kind]);
@@ -151,30 +149,39 @@ impl Placement<'_> {
             }
         }
         let sets = sets.into_iter().map(|set| fewer(&pool, set, count));
-        let mut sets: Vec<Cones> = sets.map(|set| pool.cones(&set)).collect();
-        if !self.is_small() && sets.len() > 1 {
-            // Moving each costs more than what the mesh itself says of them.
-            let mut costs = Vec::with_capacity(sets.len());
-            for cones in sets {
-                let u = self.real_log_scale(&cones.vertices, &cones.curvature);
-                costs.push((self.cost(&u), cones));
-            }
-            let best = costs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-            sets = best.into_iter().map(|(_, cones)| cones).collect();
+        sets.map(|set| pool.cones(&set)).collect()
+    }
+
+    /// The second: of several optima the one that is best by the log scale that the mesh really has.
+    fn really_best(&self, optima: Vec<Cones>) -> Vec<Cones> {
+        if optima.len() < 2 {
+            return optima;
         }
-        let mut places: Vec<usize> = sets.iter().flat_map(|c| &c.vertices).copied().collect();
-        places.sort_unstable();
-        self.keep(&places);
-        let mut found = Vec::with_capacity(sets.len());
-        for cones in sets {
+        let costs = optima.into_iter().map(|cones| {
+            let linear = self.log_scale_of(&cones.vertices, &cones.curvature);
+            let real = self.real_log_scale(&cones.vertices, &cones.curvature, &linear);
+            (self.cost(&real), cones)
+        });
+        let best = costs.min_by(|a, b| a.0.total_cmp(&b.0));
+        best.into_iter().map(|(_, cones)| cones).collect()
+    }
+
+    /// The third: optima moved on the surface, without cones that then do not pay, the best first.
+    fn all_moved(&mut self, optima: Vec<Cones>, count: Count) -> Vec<Cones> {
+        let is_one = optima.len() == 1;
+        let mut found = Vec::with_capacity(optima.len());
+        for cones in optima {
             let radii = match cones.vertices.len() <= FEW {
                 true => &RADII[..],
                 false => &RADII[WIDE..],
             };
             let cones = self.approach(cones, radii, Rule::Best);
             let cones = self.without_idle(cones, count);
-            let u = self.log_scale_of(&cones.vertices, &cones.curvature);
-            found.push((self.cost(&u), cones));
+            let cost = match is_one {
+                true => 0.0,
+                false => self.cost(&self.log_scale_of(&cones.vertices, &cones.curvature)),
+            };
+            found.push((cost, cones));
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
         found.into_iter().map(|(_, cones)| cones).collect()
@@ -225,81 +232,6 @@ impl Placement<'_> {
         faces.fold(0.0, f64::max)
     }
 
-    /// Moves cones on rings of some radii around them.
-    pub(super) fn approach(&mut self, mut now: Cones, radii: &[f64], rule: Rule) -> Cones {
-        let size = self.area().sqrt();
-        for &radius in radii {
-            now = self.moved(now, radius * size, rule);
-        }
-        now
-    }
-
-    /// One round of moves of all cones.
-    fn moved(&mut self, now: Cones, radius: f64, rule: Rule) -> Cones {
-        let u = self.log_scale_of(&now.vertices, &now.curvature);
-        let force = self.force(&u);
-        let worth = LEAST_GAIN * self.cost(&u);
-        let count = now.vertices.len();
-        let rings = (ALL_RINGS / count.max(1)).clamp(1, RINGS);
-        let mut places = now.vertices.clone();
-        let mut owner: Vec<usize> = (0..count).collect();
-        let mut taken: std::collections::BTreeSet<usize> = places.iter().copied().collect();
-        for (cone, (&v, c)) in now.vertices.iter().zip(&now.curvature).enumerate() {
-            let around = spread::around(self.mesh, VertexId::new(v), radius);
-            // The nearest vertices may be farther away than that.
-            let around: Vec<(usize, f64)> = match around.is_empty() {
-                true => {
-                    let ring = self.connectivity.neighbours(VertexId::new(v));
-                    ring.map(|w| (w.index(), 0.75 * radius)).collect()
-                }
-                false => around.iter().map(|(w, d)| (w.index(), *d)).collect(),
-            };
-            let mut outer = radius;
-            for ring in 0..rings {
-                // The last is a disk.
-                let inner = if ring + 1 == rings { 0.0 } else { 0.5 * outer };
-                let on = around.iter().filter(|(_, d)| (inner..=outer).contains(d));
-                let open = on
-                    .map(|(w, _)| *w)
-                    .filter(|w| self.allowed[*w] && !taken.contains(w));
-                let may_gain = |w: &usize| c * (force[v] - force[*w]) > worth;
-                let mut open: Vec<usize> = open.filter(may_gain).collect();
-                for _ in 0..DIRECTIONS {
-                    let lowest =
-                        |a: usize, b: usize| if c * force[b] < c * force[a] { b } else { a };
-                    let Some(best) = open.iter().copied().reduce(lowest) else {
-                        break;
-                    };
-                    taken.insert(best);
-                    places.push(best);
-                    owner.push(cone);
-                    let at = self.mesh.positions[VertexId::new(best)];
-                    let is_apart = |w: &usize| {
-                        let there = self.mesh.positions[VertexId::new(*w)];
-                        norm(sub(there, at)) > APART * outer
-                    };
-                    open.retain(is_apart);
-                }
-                outer *= 0.5;
-            }
-        }
-        if places.len() == count {
-            return now;
-        }
-        let pool = Pool::new(self, places, &u);
-        let set = pool.weigh((0..count).collect(), &now.curvature, rule);
-        let may = |i: usize, j: usize| owner[i] == owner[j];
-        let set = pool.exchange(set, rule, may);
-        pool.cones(&set)
-    }
-
-    fn area(&self) -> f64 {
-        let faces = self.connectivity.faces();
-        faces
-            .map(|f| triangle_area(self.mesh.face_positions(f)))
-            .sum()
-    }
-
     fn without_idle(&mut self, cones: Cones, count: Count) -> Cones {
         let u = self.log_scale_of(&cones.vertices, &cones.curvature);
         let pool = Pool::new(self, cones.vertices, &u);
@@ -316,7 +248,7 @@ fn more(pool: &Pool, mut set: Set, count: Count) -> Set {
         let now = set.members.len();
         let longer = AHEAD.into_iter().filter(|more| now + more <= count.most);
         let better = longer.map(|more| {
-            let next = pool.grow(set.clone(), now + more);
+            let next = pool.grow(&set, now + more);
             let next = pool.exchange(next, Rule::Best, |_, _| true);
             // From where these are, there may be no way to where so many more would be.
             let anew = match more == AHEAD[2] {
@@ -355,7 +287,7 @@ fn fewer(pool: &Pool, mut set: Set, count: Count) -> Set {
         let now = set.members.len();
         // Of very many, some at a time.
         let step = now.div_ceil(MANY).min(now - count.least);
-        let next = pool.prune(set.clone(), now - step);
+        let next = pool.prune(&set, now - step);
         let pays = share(set.members.len())
             * match set.members.len() > count.wanted {
                 true => PAYS_MUCH,
