@@ -13,7 +13,7 @@ use super::surface::by_ends;
 /// Edges of the border are further apart than this, which is far above rounding in the unit square.
 const APART: f64 = 1e-10;
 /// Cells along a side of the unit square in which the neighbourhood of turned triangles is marked.
-const CELLS: usize = 1024;
+const CELLS: usize = 512;
 
 /// Triangles as corners of points, in or near the unit square.
 pub(super) struct Drawing {
@@ -75,7 +75,7 @@ impl Drawing {
                 marked[CELLS * row..][columns.clone()].fill(true);
             }
         }
-        let mut left = 16 * self.corners.len() + CELLS * CELLS;
+        let mut left = 16 * self.corners.len() + 4 * CELLS * CELLS;
         let mut near = Vec::new();
         for at in 0..self.corners.len() {
             let [columns, mut rows] = self.cells(at);
