@@ -21,12 +21,16 @@ impl Worst {
     }
 }
 
-/// The root of a sum of squares, by the slower `hypot` only where squares may have overflowed or vanished.
-fn root(square: f64, hypot: impl Fn() -> f64) -> f64 {
+/// Length of a vector, by the slower `hypot` only where squares may have overflowed or vanished. Points that two faces share are exactly equal, so most vectors
+/// between them are zero.
+fn length<const N: usize>(vector: [f64; N]) -> f64 {
+    let square: f64 = vector.iter().map(|x| x * x).sum();
     if (1e-200..1e200).contains(&square) {
         square.sqrt()
+    } else if vector == [0.0; N] {
+        0.0
     } else {
-        hypot()
+        vector.iter().fold(0.0, |length: f64, x| length.hypot(*x))
     }
 }
 
@@ -35,8 +39,7 @@ pub(super) fn sub2(a: Point2, b: Point2) -> Point2 {
 }
 
 pub(super) fn distance2(a: Point2, b: Point2) -> f64 {
-    let [x, y] = sub2(a, b);
-    root(x * x + y * y, || x.hypot(y))
+    length(sub2(a, b))
 }
 
 pub(super) fn sub3(a: Point3, b: Point3) -> Point3 {
@@ -52,8 +55,7 @@ pub(super) fn cross3(a: Point3, b: Point3) -> Point3 {
 }
 
 pub(super) fn norm3(a: Point3) -> f64 {
-    let [x, y, z] = a;
-    root(x * x + y * y + z * z, || x.hypot(y).hypot(z))
+    length(a)
 }
 
 pub(super) fn distance3(a: Point3, b: Point3) -> f64 {
