@@ -16,7 +16,7 @@ const HEADER_LIMIT: usize = 1 << 16;
 /// Bytes that the arrays of any container may unpack to.
 const FLOOR: u64 = 64 << 20;
 
-/// A number type of the format.
+/// A number type of the format, or rows of one.
 pub(crate) trait Element: Copy {
     /// NumPy's names for it.
     const DESCR: &'static [&'static str];
@@ -24,6 +24,8 @@ pub(crate) trait Element: Copy {
     const NAME: &'static str;
     /// Bytes.
     const SIZE: usize;
+    /// Numbers in it.
+    const NUMBERS: usize = 1;
     /// From `SIZE` bytes.
     fn from_le(bytes: &[u8]) -> Self;
 }
@@ -45,6 +47,17 @@ macro_rules! element {
 element!(f64, "float64", "<f8");
 element!(u32, "uint32", "<u4");
 element!(u8, "uint8", "|u1", "<u1", "u1");
+
+/// A row of numbers, so that an array of several axes need not be copied into its rows.
+impl<T: Element, const N: usize> Element for [T; N] {
+    const DESCR: &'static [&'static str] = T::DESCR;
+    const NAME: &'static str = T::NAME;
+    const SIZE: usize = N * T::SIZE;
+    const NUMBERS: usize = N * T::NUMBERS;
+    fn from_le(bytes: &[u8]) -> Self {
+        std::array::from_fn(|i| T::from_le(&bytes[i * T::SIZE..(i + 1) * T::SIZE]))
+    }
+}
 
 /// An open container.
 pub(crate) struct Npz {
@@ -72,8 +85,8 @@ impl Npz {
         self.archive.by_name(&format!("{name}.npy")).is_ok()
     }
 
-    /// One array, whose shape must be `shape`; `None` stands for any extent. Returns the numbers in C order
-    /// and the first extent.
+    /// One array, whose shape must be `shape`; `None` stands for any extent. Returns the numbers in C order, or rows of them
+    /// where `T` is a row as long as the last axes of `shape`, and the first extent.
     pub fn read<T: Element>(
         &mut self,
         name: &str,
@@ -112,6 +125,8 @@ impl Npz {
             .shape
             .iter()
             .try_fold(1usize, |product, n| product.checked_mul(*n));
+        let count = count.filter(|count| count.is_multiple_of(T::NUMBERS));
+        let count = count.map(|count| count / T::NUMBERS);
         let bytes = count.and_then(|count| count.checked_mul(T::SIZE));
         let (Some(count), Some(bytes)) = (count, bytes) else {
             return Err(at(format!("shape {:?} is impossible", header.shape)));
@@ -133,7 +148,7 @@ impl Npz {
         };
         self.left = left;
         let mut values = Vec::with_capacity(count.min(1 << 16));
-        let mut buffer = vec![0; T::SIZE * (1 << 13)];
+        let mut buffer = vec![0; T::SIZE * (1_usize << 16).div_ceil(T::SIZE)];
         let mut left = bytes;
         while left > 0 {
             let now = left.min(buffer.len());

@@ -73,18 +73,6 @@ impl Arrays {
     }
 }
 
-fn rows<T: Copy, const N: usize>(flat: Vec<T>) -> Vec<[T; N]> {
-    flat.chunks_exact(N)
-        .map(|row| std::array::from_fn(|i| row[i]))
-        .collect()
-}
-
-fn corner_points<const N: usize>(flat: Vec<f64>) -> Vec<[Point2; N]> {
-    flat.chunks_exact(2 * N)
-        .map(|row| std::array::from_fn(|k| [row[2 * k], row[2 * k + 1]]))
-        .collect()
-}
-
 /// Reads `atlas.npz`; `None` where it cannot be used, after a failed check that says why.
 pub(super) fn read(folder: &Path, document: &Document, verdicts: &mut Verdicts) -> Option<Arrays> {
     let mut npz = match Npz::open(&folder.join("atlas.npz")) {
@@ -161,8 +149,8 @@ fn load(npz: &mut Npz) -> Result<Arrays, String> {
     ) -> Result<Vec<T>, String> {
         npz.read(name, shape).map(|(values, _)| values)
     }
-    let (positions, v) = npz.read::<f64>("positions", &[None, Some(3)])?;
-    let (faces, f) = npz.read::<u32>("faces", &[None, Some(3)])?;
+    let (positions, v) = npz.read("positions", &[None, Some(3)])?;
+    let (faces, f) = npz.read("faces", &[None, Some(3)])?;
     if v == 0 || f == 0 || v >= NONE as usize || f >= NONE as usize / 3 {
         return Err(format!("{v} vertices and {f} faces make no surface"));
     }
@@ -170,26 +158,26 @@ fn load(npz: &mut Npz) -> Result<Arrays, String> {
     let (chart_face, n) = npz.read("chart_face", &[None])?;
     let n = Some(n);
     Ok(Arrays {
-        positions: rows(positions),
-        faces: rows(faces),
+        positions,
+        faces,
         source_face: flat(npz, "source_face", &[f])?,
         source_vertex: flat(npz, "source_vertex", &[v])?,
         log_scale: flat(npz, "log_scale", &[v])?,
         target_curvature: flat(npz, "target_curvature", &[v])?,
-        flat_length: rows(flat(npz, "flat_length", &[f, Some(3)])?),
-        central_uv: corner_points(flat(npz, "central_uv", &[f, Some(3), Some(2)])?),
-        cut: rows(flat(npz, "cut", &[f, Some(3)])?),
-        segment: rows(flat(npz, "segment", &[f, Some(3)])?),
+        flat_length: flat(npz, "flat_length", &[f, Some(3)])?,
+        central_uv: flat(npz, "central_uv", &[f, Some(3), Some(2)])?,
+        cut: flat(npz, "cut", &[f, Some(3)])?,
+        segment: flat(npz, "segment", &[f, Some(3)])?,
         chart_offset: flat(npz, "chart_offset", &[None])?,
         chart_face,
         chart_sector: flat(npz, "chart_sector", &[n])?,
-        chart_uv: corner_points(flat(npz, "chart_uv", &[n, Some(3), Some(2)])?),
+        chart_uv: flat(npz, "chart_uv", &[n, Some(3), Some(2)])?,
         patch: flat(npz, "patch", &[f])?,
-        patch_uv: corner_points(flat(npz, "patch_uv", &[f, Some(3), Some(2)])?),
+        patch_uv: flat(npz, "patch_uv", &[f, Some(3), Some(2)])?,
         seam_offset: flat(npz, "seam_offset", &[None])?,
-        seam_position: rows(flat(npz, "seam_position", &[None, Some(3)])?),
-        seam_uv: corner_points(flat(npz, "seam_uv", &[None, Some(2), Some(2)])?),
-        seam_patch: rows(flat(npz, "seam_patch", &[None, Some(2)])?),
+        seam_position: flat(npz, "seam_position", &[None, Some(3)])?,
+        seam_uv: flat(npz, "seam_uv", &[None, Some(2), Some(2)])?,
+        seam_patch: flat(npz, "seam_patch", &[None, Some(2)])?,
     })
 }
 

@@ -47,7 +47,12 @@ pub(super) fn is_simple(
         return false;
     };
     let points: Vec<Point2> = (path.iter()).map(|h| at(surface.tail_corner(*h))).collect();
-    keeps_away(&points, tolerance)
+    keep_away(&[points], tolerance)
+}
+
+/// Most pairs of so many edges that are compared.
+pub(super) fn limit(edges: usize) -> u64 {
+    PAIRS.0 * edges as u64 + PAIRS.1
 }
 
 /// The border from its first halfedge on; `None` where it is not one closed path. Every halfedge is passed once, unless the two sides of an
@@ -77,44 +82,47 @@ fn around(
     }
 }
 
-/// Whether the edges of a closed polygon are further than `tolerance` from each other, but for neighbours near their common corner; false where too many lie
+/// Whether the edges of closed polygons are further than `tolerance` from each other, but for neighbours near their common corner; false where too many lie
 /// near each other.
-fn keeps_away(points: &[Point2], tolerance: f64) -> bool {
-    if !points.iter().flatten().all(|x| x.is_finite()) {
+pub(super) fn keep_away(polygons: &[Vec<Point2>], tolerance: f64) -> bool {
+    let mut points = polygons.iter().flatten().flatten();
+    if !points.all(|x| x.is_finite()) || polygons.iter().any(|p| p.len() < 3) {
         return false;
     }
-    let n = points.len();
-    let edge = |i: usize| [points[i], points[(i + 1) % n]];
-    let edges: Vec<[Point2; 2]> = (0..n).map(edge).collect();
-    let limit = 256 * n + 100_000;
-    let Ok(grid) = Grid::new(&edges, tolerance, limit) else {
+    let mut edges: Vec<[Point2; 2]> = Vec::new();
+    let mut next = Vec::new();
+    for polygon in polygons {
+        let (first, n) = (edges.len(), polygon.len());
+        edges.extend((0..n).map(|i| [polygon[i], polygon[(i + 1) % n]]));
+        next.extend((0..n).map(|i| first + (i + 1) % n));
+    }
+    let n = edges.len();
+    let Ok(grid) = Grid::new(&edges, tolerance, 256 * n + 100_000) else {
         return false;
     };
     let in_cell = |cell| grid.cell_items(cell);
     let pairs: u64 = (0..grid.cells())
         .map(|cell| (in_cell(cell).len() as u64).pow(2))
         .sum();
-    if pairs > PAIRS.0 * n as u64 + PAIRS.1 {
+    if pairs > limit(n) {
         return false;
     }
     let meet = |a: usize, b: usize| {
-        let (first, second) = (a.min(b), a.max(b));
-        if second == first + 1 {
-            neighbours_meet(edges[first], edges[second], tolerance)
-        } else if first == 0 && second == n - 1 {
-            neighbours_meet(edges[second], edges[first], tolerance)
+        if next[a] == b {
+            neighbours_meet(edges[a], edges[b], tolerance)
+        } else if next[b] == a {
+            neighbours_meet(edges[b], edges[a], tolerance)
         } else {
-            edges_meet(edges[first], edges[second], tolerance)
+            edges_meet(edges[a], edges[b], tolerance)
         }
     };
-    n > 2
-        && (0..grid.cells()).all(|cell| {
-            let items = in_cell(cell);
-            items.iter().enumerate().all(|(i, a)| {
-                let mut others = items[i + 1..].iter();
-                !others.any(|b| meet(*a as usize, *b as usize))
-            })
+    (0..grid.cells()).all(|cell| {
+        let items = in_cell(cell);
+        items.iter().enumerate().all(|(i, a)| {
+            let mut others = items[i + 1..].iter();
+            !others.any(|b| meet(*a as usize, *b as usize))
         })
+    })
 }
 
 /// Whether two edges cross or come this near.
@@ -145,6 +153,10 @@ fn is_near(r: Point2, [p, q]: [Point2; 2], tolerance: f64) -> bool {
 mod tests {
     use super::*;
     use std::f64::consts::TAU;
+
+    fn keeps_away(points: &[Point2], tolerance: f64) -> bool {
+        keep_away(&[points.to_vec()], tolerance)
+    }
 
     #[test]
     fn what_crosses_or_touches_itself_does_not_keep_away() {

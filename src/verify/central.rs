@@ -41,9 +41,9 @@ pub(super) fn length_error(uv: [Point2; 3], flat: [f64; 3], diameter: f64) -> f6
     let mut worst = Worst::default();
     let l = lengths2(uv);
     for k in 0..3 {
-        worst.see(((l[k] - flat[k]).abs() - FLOOR * diameter).max(0.0) / longest(flat));
+        worst.see(((l[k] - flat[k]).abs() - FLOOR * diameter).max(0.0));
     }
-    worst.0
+    worst.0 / longest(flat)
 }
 
 /// Corner of a chart that holds one coordinate a corner of every face.
@@ -113,7 +113,6 @@ fn check_slit(
     let faces = arrays.faces.len();
     let mut gap = Worst::default();
     let mut sheets = UnionFind::new(faces);
-    let mut copies = UnionFind::new(3 * faces);
     let mut slit_edges = surface.edges() as i64;
     for (h, t) in surface.inner_edges() {
         if cut[h] != cut[t] {
@@ -128,7 +127,6 @@ fn check_slit(
             (surface.tail_corner(h), surface.head_corner(t)),
             (surface.head_corner(h), surface.tail_corner(t)),
         ] {
-            copies.join(a, b);
             gap.see(distance2(at_corner(uv, a), at_corner(uv, b)));
         }
     }
@@ -143,13 +141,19 @@ fn check_slit(
         sheets == 1,
         format!("{sheets} pieces"),
     );
-    let chi = copies.sets() as i64 - slit_edges + faces as i64;
-    verdicts.note("slit surface is a disk", chi == 1, format!("chi {chi}"));
     let mut touched = surface.on_boundary.clone();
     for h in (0..surface.halfedges()).filter(|h| cut[*h] != 0) {
         touched[surface.tail(h)] = true;
         touched[surface.head(h)] = true;
     }
+    // Every vertex has a copy for every fan of faces into which the cut divides it.
+    let uncut = |h: usize| cut[h] == 0;
+    let copies = (0..touched.len()).map(|v| match touched[v] {
+        true => surface.fans(v, uncut),
+        false => surface.fans_of[v] as usize,
+    });
+    let chi = copies.sum::<usize>() as i64 - slit_edges + faces as i64;
+    verdicts.note("slit surface is a disk", chi == 1, format!("chi {chi}"));
     let inside: Vec<usize> = document
         .cones
         .iter()

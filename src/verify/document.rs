@@ -122,10 +122,7 @@ pub(super) struct Gluing {
 
 impl Gluing {
     pub fn motion(&self) -> Motion {
-        Motion {
-            rotation: self.rotation,
-            translation: self.translation,
-        }
+        Motion::new(self.rotation, self.translation)
     }
 }
 
@@ -161,10 +158,7 @@ pub(super) struct Transition {
 
 impl Transition {
     pub fn motion(&self) -> Motion {
-        Motion {
-            rotation: self.rotation,
-            translation: self.translation,
-        }
+        Motion::new(self.rotation, self.translation)
     }
 }
 

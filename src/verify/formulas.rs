@@ -21,12 +21,16 @@ impl Worst {
     }
 }
 
-/// The root of a sum of squares, by the slower `hypot` only where squares may have overflowed or vanished.
-fn root(square: f64, hypot: impl Fn() -> f64) -> f64 {
+/// Length of a vector, by the slower `hypot` only where squares may have overflowed or vanished. Points that two faces share are exactly equal, so most vectors
+/// between them are zero.
+fn length<const N: usize>(vector: [f64; N]) -> f64 {
+    let square: f64 = vector.iter().map(|x| x * x).sum();
     if (1e-200..1e200).contains(&square) {
         square.sqrt()
+    } else if vector == [0.0; N] {
+        0.0
     } else {
-        hypot()
+        vector.iter().fold(0.0, |length: f64, x| length.hypot(*x))
     }
 }
 
@@ -35,8 +39,7 @@ pub(super) fn sub2(a: Point2, b: Point2) -> Point2 {
 }
 
 pub(super) fn distance2(a: Point2, b: Point2) -> f64 {
-    let [x, y] = sub2(a, b);
-    root(x * x + y * y, || x.hypot(y))
+    length(sub2(a, b))
 }
 
 pub(super) fn sub3(a: Point3, b: Point3) -> Point3 {
@@ -52,8 +55,7 @@ pub(super) fn cross3(a: Point3, b: Point3) -> Point3 {
 }
 
 pub(super) fn norm3(a: Point3) -> f64 {
-    let [x, y, z] = a;
-    root(x * x + y * y + z * z, || x.hypot(y).hypot(z))
+    length(a)
 }
 
 pub(super) fn distance3(a: Point3, b: Point3) -> f64 {
@@ -70,42 +72,75 @@ pub(super) fn mix3(t: [Point3; 3], w: [f64; 3]) -> Point3 {
 pub(super) struct Motion {
     pub rotation: f64,
     pub translation: Point2,
+    /// Of the rotation, since motions are applied to many points.
+    turn: Turn,
 }
 
 impl Motion {
     pub const IDENTITY: Motion = Motion {
         rotation: 0.0,
         translation: [0.0, 0.0],
+        turn: Turn {
+            sine: 0.0,
+            cosine: 1.0,
+        },
     };
 
+    pub fn new(rotation: f64, translation: Point2) -> Self {
+        Self {
+            rotation,
+            translation,
+            turn: Turn::by(rotation),
+        }
+    }
+
     pub fn apply(&self, p: Point2) -> Point2 {
-        let q = rotate(p, self.rotation);
+        let q = self.turn.apply(p);
         [q[0] + self.translation[0], q[1] + self.translation[1]]
     }
 
     pub fn inverse_apply(&self, p: Point2) -> Point2 {
-        rotate(sub2(p, self.translation), -self.rotation)
+        self.turn.inverse().apply(sub2(p, self.translation))
     }
 
     /// First `first`, then `self`.
     pub fn after(&self, first: &Motion) -> Motion {
-        Motion {
-            rotation: self.rotation + first.rotation,
-            translation: self.apply(first.translation),
-        }
+        let rotation = self.rotation + first.rotation;
+        Motion::new(rotation, self.apply(first.translation))
     }
 
     pub fn inverse(&self) -> Motion {
+        let turn = self.turn.inverse();
         Motion {
             rotation: -self.rotation,
-            translation: rotate([-self.translation[0], -self.translation[1]], -self.rotation),
+            translation: turn.apply([-self.translation[0], -self.translation[1]]),
+            turn,
         }
     }
 }
 
-pub(super) fn rotate(p: Point2, angle: f64) -> Point2 {
-    let (s, c) = angle.sin_cos();
-    [c * p[0] - s * p[1], s * p[0] + c * p[1]]
+/// A rotation about the origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Turn {
+    sine: f64,
+    cosine: f64,
+}
+
+impl Turn {
+    pub fn by(angle: f64) -> Self {
+        let (sine, cosine) = angle.sin_cos();
+        Self { sine, cosine }
+    }
+
+    fn inverse(self) -> Self {
+        let sine = -self.sine;
+        Self { sine, ..self }
+    }
+
+    pub fn apply(self, p: Point2) -> Point2 {
+        let Self { sine, cosine } = self;
+        [cosine * p[0] - sine * p[1], sine * p[0] + cosine * p[1]]
+    }
 }
 
 /// Distance of an angle from the nearest multiple of `period`.
@@ -148,31 +183,61 @@ pub(super) fn area3(t: [Point3; 3]) -> f64 {
 
 /// Area from lengths (Heron's formula on sorted sides, which does not cancel); 0 where they span no triangle.
 pub(super) fn area_from_lengths(l: [f64; 3]) -> f64 {
-    let mut s = l;
-    s.sort_by(|a, b| b.total_cmp(a));
-    let [a, b, c] = s;
+    let [a, b, c] = descending(l);
     let product = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c));
     0.25 * product.max(0.0).sqrt()
 }
 
-/// Corner angles from lengths, by half angles: tan²(θ/2) = (l_b² side differences) / (side sums).
-pub(super) fn corner_angles(l: [f64; 3]) -> [f64; 3] {
+fn descending([x, y, z]: [f64; 3]) -> [f64; 3] {
+    let (high, low) = (x.max(y), x.min(y));
+    [high.max(z), low.max(high.min(z)), low.min(z)]
+}
+
+/// Tangents of half the corner angles from lengths: tan²(θ/2) = (products of side differences) / (products of side sums). Infinite
+/// for a straight angle.
+pub(super) fn half_tangents(l: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|k| {
         let (a, b, c) = (l[k], l[(k + 1) % 3], l[(k + 2) % 3]);
         let over = ((a - b) + c) * ((a + b) - c);
         let under = (a + b + c) * ((b + c) - a);
-        2.0 * over.max(0.0).sqrt().atan2(under.max(0.0).sqrt())
+        if over > 0.0 {
+            (over / under.max(0.0)).sqrt()
+        } else {
+            0.0
+        }
     })
 }
 
-/// Smallest sine of the corner angles, where a thin triangle makes angles ill-conditioned.
-pub(super) fn least_sine(angles: [f64; 3]) -> f64 {
-    angles.iter().fold(1.0, |least, a| a.sin().min(least))
+/// Angles from the tangents of their halves.
+pub(super) fn angles_from(halves: [f64; 3]) -> [f64; 3] {
+    halves.map(|t| 2.0 * t.atan())
+}
+
+/// Distance of two angles in [0, π/2] from their tangents: tan(α − β) = (tan α − tan β) / (1 + tan α tan β).
+pub(super) fn half_angle_gap(s: f64, t: f64) -> f64 {
+    let tangent = ((s - t) / (1.0 + s * t)).abs();
+    if tangent < 0.125 {
+        // So small, the series needs eight terms for full precision.
+        let square = tangent * tangent;
+        let term = |sum: f64, n: i32| 1.0 / f64::from(n) - square * sum;
+        tangent * [13, 11, 9, 7, 5, 3, 1].into_iter().fold(1.0 / 15.0, term)
+    } else {
+        (s.atan() - t.atan()).abs()
+    }
+}
+
+/// Smallest sine of the corner angles from lengths, where a thin triangle makes angles ill-conditioned: that between the two longest
+/// sides, as the area tells it. The factors of the area are divided one by one, so that nothing overflows.
+pub(super) fn least_sine(l: [f64; 3]) -> f64 {
+    let [a, b, c] = descending(l);
+    let long = ((a + (b + c)) / a) * ((a + (b - c)) / a);
+    let short = ((c - (a - b)) / b) * ((c + (a - b)) / b);
+    (0.5 * (long * short).max(0.0).sqrt()).min(1.0)
 }
 
 /// How far angles of a face may be off because its lengths are rounded (radians).
-pub(super) fn angle_slack(l: [f64; 3], angles: [f64; 3]) -> f64 {
-    let thin = if least_sine(angles) < 1e-7 { 3e-8 } else { 0.0 };
+pub(super) fn angle_slack(l: [f64; 3]) -> f64 {
+    let thin = if least_sine(l) < 1e-7 { 3e-8 } else { 0.0 };
     4e-15 * longest(l) / shortest(l) + thin
 }
 
@@ -236,8 +301,11 @@ pub(super) fn bounds3<'a>(points: impl IntoIterator<Item = &'a Point3>) -> (Poin
 /// Whether a face is counterclockwise, up to what double precision can tell of a sliver at coordinates as
 /// large as `reach`. A face so small that its corners coincide there is not flipped.
 pub(super) fn is_positive(t: [Point2; 3], reach: f64) -> bool {
-    let l = longest(lengths2(t));
-    doubled_area2(t) >= -1e-14 * l * l - 1e-13 * reach * l
+    let area = doubled_area2(t);
+    area >= 0.0 || {
+        let l = longest(lengths2(t));
+        area >= -1e-14 * l * l - 1e-13 * reach * l
+    }
 }
 
 /// Whether a rotation lies in (−π, π].
@@ -252,7 +320,7 @@ mod tests {
     #[test]
     fn angles_and_areas_of_a_three_four_five_triangle() {
         let l = [3.0, 4.0, 5.0];
-        let a = corner_angles(l);
+        let a = angles_from(half_tangents(l));
         assert!((a[2] - PI / 2.0).abs() < 1e-15);
         assert!((a[0] - (3.0f64 / 5.0).asin()).abs() < 1e-15);
         assert!((a.iter().sum::<f64>() - PI).abs() < 1e-14);
@@ -261,15 +329,42 @@ mod tests {
     }
 
     #[test]
+    fn least_sines_are_those_of_the_angles() {
+        for l in [
+            [3.0, 4.0, 5.0],
+            [5.0, 5.0, 1e-3],
+            [1.0, 0.7, 0.4],
+            [2e-200, 3e-200, 2e-200],
+            [2e200, 3e200, 2e200],
+        ] {
+            // Scaled, as the squares in the angles overflow; the angle between long sides cancels some digits.
+            let angles = angles_from(half_tangents(l.map(|x| x / longest(l))));
+            let least = angles.iter().fold(1.0, |m: f64, a| m.min(a.sin()));
+            assert!((least_sine(l) - least).abs() < 1e-12 * least, "{l:?}");
+        }
+        for l in [[1.0, 1.0, 0.0], [1.0, 1.0, 3.0], [0.0; 3], [2.0, 1.0, 1.0]] {
+            assert_eq!(least_sine(l), 0.0, "{l:?}");
+        }
+    }
+
+    #[test]
+    fn gaps_of_angles_agree_with_their_difference() {
+        let mut angles: Vec<f64> = (0..50).map(|i| f64::from(i) * PI / 100.0).collect();
+        angles.extend([PI / 2.0, 1e-9, 0.3 + 1e-7]);
+        for a in &angles {
+            for b in &angles {
+                let gap = half_angle_gap(a.tan(), b.tan());
+                assert!((gap - (a - b).abs()).abs() < 1e-15, "{a} {b}: {gap}");
+            }
+        }
+        assert_eq!(half_angle_gap(f64::INFINITY, f64::INFINITY), 0.0);
+        assert_eq!(half_angle_gap(f64::INFINITY, 0.0), PI / 2.0);
+    }
+
+    #[test]
     fn motions_compose_and_invert() {
-        let a = Motion {
-            rotation: 2.5,
-            translation: [1.0, -3.0],
-        };
-        let b = Motion {
-            rotation: -1.25,
-            translation: [0.5, 0.25],
-        };
+        let a = Motion::new(2.5, [1.0, -3.0]);
+        let b = Motion::new(-1.25, [0.5, 0.25]);
         let p = [0.75, -2.0];
         assert!(distance2(a.after(&b).apply(p), a.apply(b.apply(p))) < 1e-14);
         assert!(distance2(a.inverse_apply(a.apply(p)), p) < 1e-14);

@@ -4,8 +4,9 @@
 use super::Verdicts;
 use super::arrays::Arrays;
 use super::document::Document;
-use super::formulas::{Point2, Point3, bounds3, doubled_area2};
-use super::patches::{Overlap, find_overlap};
+use super::drawing::Drawing;
+use super::formulas::{Point2, Point3, bounds3};
+use super::patches::Overlap;
 use super::surface::UnionFind;
 use crate::read::bounded::read_bounded;
 use serde_json::Value;
@@ -53,9 +54,9 @@ pub(super) fn check(folder: &Path, arrays: &Arrays, document: &Document, verdict
         drawn.outside == 0,
         format!("{} of {} outside", drawn.outside, drawn.vertices),
     );
-    let mut overlap = find_overlap(&drawn.packed, PACKED_TOLERANCE);
+    let mut overlap = drawn.packed.overlap(PACKED_TOLERANCE);
     // Inside an island faces lie as in their patch, of which the same is asked.
-    if overlap == Overlap::Undecided && boxes_are_apart(&drawn.packed) {
+    if overlap == Overlap::Undecided && boxes_are_apart(&drawn.packed.triangles()) {
         overlap = Overlap::None;
     }
     verdicts.note(
@@ -82,7 +83,6 @@ pub(super) fn check(folder: &Path, arrays: &Arrays, document: &Document, verdict
     );
 }
 
-/// The JSON and the binary chunk.
 /// Whether the boxes of all islands (triangles that hang together by equal corners) lie apart from each other.
 fn boxes_are_apart(packed: &[[Point2; 3]]) -> bool {
     let key = |p: Point2| p.map(f64::to_bits);
@@ -112,6 +112,7 @@ fn boxes_are_apart(packed: &[[Point2; 3]]) -> bool {
         && (boxes.iter().enumerate()).all(|(i, a)| boxes[i + 1..].iter().all(|b| !meet(*a, *b)))
 }
 
+/// The JSON and the binary chunk.
 fn parse(bytes: &[u8]) -> Result<(Value, &[u8]), String> {
     let word = |at: usize| {
         let bytes = bytes.get(at..at + 4)?;
@@ -146,8 +147,8 @@ fn parse(bytes: &[u8]) -> Result<(Value, &[u8]), String> {
 
 struct Drawn {
     triangles: usize,
-    /// Texture coordinates of the triangles, counterclockwise whichever way `v` runs.
-    packed: Vec<[Point2; 3]>,
+    /// The triangles in texture coordinates.
+    packed: Drawing,
     vertices: usize,
     outside: usize,
     low: Point3,
@@ -161,7 +162,10 @@ struct Drawn {
 fn draw(root: &Value, binary: &[u8], faces: usize) -> Result<Drawn, String> {
     let mut drawn = Drawn {
         triangles: 0,
-        packed: Vec::new(),
+        packed: Drawing {
+            corners: Vec::new(),
+            points: Vec::new(),
+        },
         vertices: 0,
         outside: 0,
         low: [f64::INFINITY; 3],
@@ -218,17 +222,25 @@ fn draw_primitive(
     if uv.count != positions.count {
         return Err("has attributes of different counts".to_owned());
     }
-    for i in 0..positions.count {
+    let first = drawn.packed.points.len();
+    if u32::try_from(first.saturating_add(positions.count)).is_err() {
+        return Err("has too many vertices".to_owned());
+    }
+    for position in positions.rows::<3>() {
         for (k, shift) in shift.iter().enumerate() {
-            let x = positions.component(i, k) + shift;
+            let x = position[k] + shift;
             if !x.is_finite() {
                 return Err("has infinite positions".to_owned());
             }
             drawn.low[k] = drawn.low[k].min(x);
             drawn.high[k] = drawn.high[k].max(x);
         }
-        let inside = (0..2).all(|k| (0.0..=1.0).contains(&uv.component(i, k)));
+    }
+    let packed = &mut drawn.packed;
+    for point in uv.rows::<2>() {
+        let inside = point.iter().all(|x| (0.0..=1.0).contains(x));
         drawn.outside += usize::from(!inside);
+        packed.points.push(point);
     }
     drawn.vertices += positions.count;
     let indices = match primitive.get("indices") {
@@ -245,24 +257,26 @@ fn draw_primitive(
     if !corners.is_multiple_of(3) {
         return Err("has corners that make no triangle".to_owned());
     }
-    for triangle in 0..corners / 3 {
-        let mut packed = [[0.0; 2]; 3];
-        for (k, point) in packed.iter_mut().enumerate() {
-            let corner = 3 * triangle + k;
-            let vertex = match &indices {
-                None => corner,
-                // Whole numbers below 2³², so the conversion is exact.
-                Some(indices) => indices.component(corner, 0) as usize,
-            };
-            if vertex >= positions.count {
-                return Err("has an index beyond its vertices".to_owned());
+    packed.corners.reserve(corners / 3);
+    let mut add = |triangle: [usize; 3]| {
+        if triangle.iter().any(|vertex| *vertex >= positions.count) {
+            return Err("has an index beyond its vertices".to_owned());
+        }
+        // Below the number of points, which was tested above.
+        packed.corners.push(triangle.map(|v| (first + v) as u32));
+        Ok(())
+    };
+    match &indices {
+        None => (0..corners / 3).try_for_each(|t| add([3 * t, 3 * t + 1, 3 * t + 2]))?,
+        Some(indices) => {
+            let mut corners = indices.rows::<1>();
+            // Whole numbers below 2³², so the conversion is exact.
+            while let (Some([a]), Some([b]), Some([c])) =
+                (corners.next(), corners.next(), corners.next())
+            {
+                add([a, b, c].map(|x| x as usize))?;
             }
-            *point = [uv.component(vertex, 0), uv.component(vertex, 1)];
         }
-        if doubled_area2(packed) < 0.0 {
-            packed.swap(0, 1);
-        }
-        drawn.packed.push(packed);
     }
     drawn.triangles += corners / 3;
     Ok(())
@@ -340,6 +354,11 @@ impl<'a> Accessor<'a> {
             kind,
             is_scalar: shape == "SCALAR",
         })
+    }
+
+    /// All rows of `N` numbers.
+    fn rows<const N: usize>(&self) -> impl Iterator<Item = [f64; N]> + '_ {
+        (0..self.count).map(|row| std::array::from_fn(|column| self.component(row, column)))
     }
 
     /// One number; normalised integers as fractions of their greatest value.

@@ -4,7 +4,7 @@ use super::Verdicts;
 use super::arrays::Arrays;
 use super::channels;
 use super::document::{Document, Patch};
-use super::formulas::{Point2, Point3, Worst, diagonal3, mix3, norm3};
+use super::formulas::{Point2, Point3, Worst, diagonal3, distance2, mix3, norm3};
 use super::patches::Groups;
 use super::shared::{self, Sides};
 use crate::read::exr::{self, Image, Read};
@@ -314,6 +314,14 @@ impl<'a> Raster<'a> {
         if det.is_nan() || det.abs() < 1e-14 || width == 0 || height == 0 {
             return;
         }
+        let ys = t.map(|p| p[1]);
+        let top = (ys[0].min(ys[1]).min(ys[2]) - BORDER).ceil().max(0.0);
+        let bottom = (ys[0].max(ys[1]).max(ys[2]) + BORDER)
+            .floor()
+            .min(height as f64 - 1.0);
+        if top.is_nan() || bottom.is_nan() || bottom < top {
+            return;
+        }
         // Barycentric coordinate k is constant[k] + across[k]·x + down[k]·y about the first corner, to which
         // the second and third belong; its gradient is 1 / (distance of corner k from its opposite edge).
         let gradient = |p: Point2, q: Point2| [-(q[1] - p[1]) / det, (q[0] - p[0]) / det];
@@ -328,15 +336,7 @@ impl<'a> Raster<'a> {
             let c = gradients[2][0] * x + gradients[2][1] * y;
             [1.0 - b - c, b, c]
         };
-        let slack = gradients.map(|g| BORDER * g[0].hypot(g[1]));
-        let ys = t.map(|p| p[1]);
-        let top = (ys[0].min(ys[1]).min(ys[2]) - BORDER).ceil().max(0.0);
-        let bottom = (ys[0].max(ys[1]).max(ys[2]) + BORDER)
-            .floor()
-            .min(height as f64 - 1.0);
-        if top.is_nan() || bottom.is_nan() || bottom < top {
-            return;
-        }
+        let slack = gradients.map(|g| BORDER * distance2(g, [0.0; 2]));
         let corners = self.arrays.triangle(f as usize);
         for row in top as usize..=bottom as usize {
             let (mut from, mut to) = (0.0f64, width as f64 - 1.0);

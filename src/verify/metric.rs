@@ -2,7 +2,8 @@
 
 use super::arrays::Arrays;
 use super::document::Document;
-use super::formulas::{Worst, angle_slack, corner_angles};
+use super::formulas::{Worst, angle_slack};
+use super::shapes::Shapes;
 use super::surface::Surface;
 use super::{Verdicts, VerifyOptions};
 use std::collections::BTreeMap;
@@ -16,8 +17,6 @@ const CURVATURE_TOLERANCE: f64 = 1e-9;
 
 /// What later checks need of the metric.
 pub(super) struct Metric {
-    /// Corner angles of every face in the flat metric.
-    pub angles: Vec<[f64; 3]>,
     /// Whether the curvature of boundary vertices is whatever it came to be.
     pub free_boundary: bool,
 }
@@ -26,6 +25,7 @@ pub(super) fn check(
     surface: &Surface<'_>,
     arrays: &Arrays,
     document: &Document,
+    shapes: &Shapes,
     options: &VerifyOptions,
     verdicts: &mut Verdicts,
 ) -> Metric {
@@ -59,19 +59,15 @@ pub(super) fn check(
         format!("{:.3e}", apart.0),
     );
 
-    let angles: Vec<[f64; 3]> = arrays
-        .flat_length
-        .iter()
-        .map(|l| corner_angles(*l))
-        .collect();
     let mut curvature: Vec<f64> = surface
         .on_boundary
         .iter()
         .map(|boundary| if *boundary { PI } else { TAU })
         .collect();
     let mut blur = vec![0.0; vertices];
-    for ((face, l), angle) in arrays.faces.iter().zip(&arrays.flat_length).zip(&angles) {
-        let face_slack = angle_slack(*l, *angle);
+    let corners = arrays.faces.iter().zip(&shapes.angles);
+    for ((face, angle), l) in corners.zip(&arrays.flat_length) {
+        let face_slack = angle_slack(*l);
         for k in 0..3 {
             curvature[face[k] as usize] -= angle[k];
             blur[face[k] as usize] += face_slack;
@@ -125,7 +121,6 @@ pub(super) fn check(
     );
     check_cones(surface, target, free, document, options, verdicts);
     Metric {
-        angles,
         free_boundary: free,
     }
 }

@@ -19,6 +19,7 @@ mod central;
 mod channels;
 mod charts;
 mod document;
+mod drawing;
 mod formulas;
 mod glb;
 mod grid;
@@ -28,6 +29,7 @@ mod packed;
 mod patches;
 mod quality;
 mod seams;
+mod shapes;
 mod shared;
 mod source;
 mod surface;
@@ -312,20 +314,35 @@ pub fn verify_atlas(
     };
     let surface = surface::Surface::new(&arrays);
     surface::check(&surface, &arrays, &document, &mut verdicts);
-    let metric = metric::check(&surface, &arrays, &document, options, &mut verdicts);
+    let shapes = shapes::Shapes::new(&arrays);
+    let metric = metric::check(
+        &surface,
+        &arrays,
+        &document,
+        &shapes,
+        options,
+        &mut verdicts,
+    );
     let slit = central::check(&surface, &arrays, &document, options, &mut verdicts);
     transitions::check(&surface, &arrays, &document, &slit, &metric, &mut verdicts);
     charts::check(&surface, &arrays, &document, &slit, &mut verdicts);
     if let Some(source) = source {
         source::check(&arrays, &document, source, &mut verdicts);
     }
-    quality::check(&arrays, &document, &metric, &mut verdicts);
-    if let Some(groups) =
-        patches::check(&surface, &arrays, &document, options, &slit, &mut verdicts)
-    {
+    quality::check(&arrays, &document, &shapes, &mut verdicts);
+    let groups = patches::check(
+        &surface,
+        &arrays,
+        &document,
+        &shapes,
+        options,
+        &slit,
+        &mut verdicts,
+    );
+    if let Some(groups) = groups {
         images::check(folder, &arrays, &document, &groups, &mut verdicts);
         packed::check(folder, &document, &mut verdicts);
-        seams::check(&surface, &arrays, &document, &mut verdicts);
+        seams::check(&surface, &arrays, &document, &groups, &mut verdicts);
     }
     glb::check(folder, &arrays, &document, &mut verdicts);
     verdicts

@@ -3,11 +3,9 @@
 use super::arrays::{Arrays, NONE};
 use super::central::{FLOOR, LENGTH_TOLERANCE, Slit, at_corner};
 use super::document::{Document, Patch};
-use super::formulas::{
-    Extent2, Point2, Worst, area_from_lengths, area3, corner_angles, distance2, is_positive,
-    least_sine, lengths2, lengths3, longest, rotate,
-};
+use super::formulas::{Extent2, Point2, Turn, Worst, distance2, is_positive, lengths2, longest};
 use super::grid::Grid;
+use super::shapes::Shapes;
 use super::surface::{Surface, UnionFind};
 use super::{Verdicts, VerifyOptions, border};
 use rayon::prelude::*;
@@ -71,6 +69,7 @@ pub(super) fn check(
     surface: &Surface<'_>,
     arrays: &Arrays,
     document: &Document,
+    shapes: &Shapes,
     options: &VerifyOptions,
     slit: &Slit,
     verdicts: &mut Verdicts,
@@ -99,7 +98,7 @@ pub(super) fn check(
     let measured: Vec<Measured> = document
         .patches
         .par_iter()
-        .map(|patch| measure(surface, arrays, patch, groups.of(patch.id), slit))
+        .map(|patch| measure(surface, arrays, patch, groups.of(patch.id), shapes, slit))
         .collect();
     let mut shape = Worst::default();
     let mut range = Worst::default();
@@ -208,6 +207,7 @@ fn measure(
     arrays: &Arrays,
     patch: &Patch,
     faces: &[u32],
+    shapes: &Shapes,
     slit: &Slit,
 ) -> Measured {
     let extent = extent(arrays, faces);
@@ -216,23 +216,26 @@ fn measure(
     let mut shape = Worst::default();
     let mut apart = Worst::default();
     let mut range = [f64::INFINITY, f64::NEG_INFINITY];
-    for f in faces {
-        let flat = arrays.flat_length[*f as usize];
-        if let Some(map) = &patch.patch_to_chart {
-            let l = lengths2(uv(*f));
+    if let Some(map) = &patch.patch_to_chart {
+        let turn = Turn::by(map.rotation);
+        for f in faces {
+            let flat = arrays.flat_length[*f as usize];
+            let (l, central) = (lengths2(uv(*f)), arrays.central_uv[*f as usize]);
+            let mut worst = Worst::default();
             for k in 0..3 {
                 let error = (map.scale * l[k] - flat[k]).abs() - FLOOR * map.scale * diameter;
-                shape.see(error.max(0.0) / longest(flat));
-                let p = rotate(uv(*f)[k], map.rotation);
+                worst.see(error.max(0.0));
+                let p = turn.apply(uv(*f)[k]);
                 let q = std::array::from_fn(|i| map.scale * p[i] + map.translation[i]);
-                apart.see(distance2(q, arrays.central_uv[*f as usize][k]));
+                apart.see(distance2(q, central[k]));
             }
-            shape.see(if map.scale > 0.0 { 0.0 } else { f64::INFINITY });
+            shape.see(worst.0 / longest(flat));
         }
-        let corners = arrays.triangle(*f as usize);
-        let well = |l: [f64; 3]| least_sine(corner_angles(l)) > 1e-5;
-        if well(flat) && well(lengths3(corners)) {
-            let scale = 0.5 * (area_from_lengths(flat) / area3(corners)).ln();
+        shape.see(if map.scale > 0.0 { 0.0 } else { f64::INFINITY });
+    }
+    for f in faces.iter().map(|f| *f as usize) {
+        if shapes.is_well[f] {
+            let scale = shapes.log_scale[f];
             range = [range[0].min(scale), range[1].max(scale)];
         }
     }

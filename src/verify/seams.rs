@@ -7,6 +7,7 @@ use super::formulas::{
     Extent2, Point2, Point3, Worst, diagonal3, distance2, distance3, doubled_area2, sub2,
 };
 use super::grid::Grid;
+use super::patches::{Groups, extent};
 use super::surface::Surface;
 use rayon::prelude::*;
 
@@ -64,6 +65,7 @@ pub(super) fn check(
     surface: &Surface<'_>,
     arrays: &Arrays,
     document: &Document,
+    groups: &Groups,
     verdicts: &mut Verdicts,
 ) {
     let cut = arrays.cut.as_flattened();
@@ -79,7 +81,8 @@ pub(super) fn check(
     };
     let (mut inner, mut outer) = (0.0, 0.0);
     let mut sides = vec![(Vec::new(), Vec::new()); document.patches.len()];
-    for h in (0..surface.halfedges()).filter(|h| is_border(*h)) {
+    let border: Vec<usize> = (0..surface.halfedges()).filter(|h| is_border(*h)).collect();
+    for &h in &border {
         match surface.twin(h) {
             Some(_) => inner += 0.5 * length(h),
             None => outer += length(h),
@@ -157,14 +160,14 @@ pub(super) fn check(
         ill,
     );
     if document.is_generated() {
-        let (gap, area) = around_patches(arrays, document);
+        let (gap, area) = around_patches(arrays, document, groups);
         verdicts.note(
             "seams close once around every patch",
             gap.0 <= 1e-9 && area.0 <= 1e-6,
             format!("gap {:.2e} of the patch, area off by {:.2e}", gap.0, area.0),
         );
     }
-    let lost = unsampled_vertices(surface, arrays, &is_border, document.is_generated());
+    let lost = unsampled_vertices(surface, arrays, &border, document.is_generated());
     verdicts.note(
         "seams sample every vertex of their chains",
         lost == 0,
@@ -174,16 +177,14 @@ pub(super) fn check(
 
 /// Walked with the patch on the left, its seams must add up to nothing and enclose the area of its faces: what they leave open,
 /// relative to the patch's extent, and the error of the area, relative to it.
-fn around_patches(arrays: &Arrays, document: &Document) -> (Worst, Worst) {
+fn around_patches(arrays: &Arrays, document: &Document, groups: &Groups) -> (Worst, Worst) {
     let count = document.patches.len();
-    let mut points: Vec<Vec<Point2>> = vec![Vec::new(); count];
-    let mut area = vec![0.0; count];
-    for (&patch, &uv) in arrays.patch.iter().zip(&arrays.patch_uv) {
-        if let Some(sum) = area.get_mut(patch as usize) {
-            *sum += doubled_area2(uv);
-            points[patch as usize].extend(uv);
-        }
-    }
+    let area = |patch: usize| -> f64 {
+        let faces = groups.of(patch).iter();
+        faces
+            .map(|f| doubled_area2(arrays.patch_uv[*f as usize]))
+            .sum()
+    };
     let mut sum = vec![[0.0; 2]; count];
     let mut enclosed = vec![0.0; count];
     for (seam, patches) in arrays.seam_patch.iter().enumerate() {
@@ -191,9 +192,10 @@ fn around_patches(arrays: &Arrays, document: &Document) -> (Worst, Worst) {
             let patch = patch as usize;
             let sign = if side == 0 { 1.0 } else { -1.0 };
             // Seen from a point of the patch, so that nothing is lost.
-            let Some(&from) = points[patch].first() else {
+            let Some(face) = groups.of(patch).first() else {
                 continue;
             };
+            let from = arrays.patch_uv[*face as usize][0];
             for pair in arrays.seam_uv[arrays.seam_range(seam)].windows(2) {
                 let (a, b) = (pair[0][side], pair[1][side]);
                 enclosed[patch] += sign * doubled_area2([from, a, b]);
@@ -206,11 +208,9 @@ fn around_patches(arrays: &Arrays, document: &Document) -> (Worst, Worst) {
     }
     let (mut gap, mut off) = (Worst::default(), Worst::default());
     for patch in 0..count {
-        let extent = Extent2::of(points[patch].iter().copied())
-            .diagonal()
-            .max(1e-300);
+        let extent = extent(arrays, groups.of(patch)).diagonal().max(1e-300);
         gap.see(distance2(sum[patch], [0.0; 2]) / extent);
-        off.see((enclosed[patch] / area[patch] - 1.0).abs());
+        off.see((enclosed[patch] / area(patch) - 1.0).abs());
     }
     (gap, off)
 }
@@ -219,14 +219,14 @@ fn around_patches(arrays: &Arrays, document: &Document) -> (Worst, Worst) {
 fn unsampled_vertices(
     surface: &Surface<'_>,
     arrays: &Arrays,
-    is_border: &dyn Fn(usize) -> bool,
+    border: &[usize],
     with_boundary: bool,
 ) -> usize {
     let key = |p: &Point3| p.map(|x| (x + 0.0).to_bits());
     let samples: std::collections::HashSet<[u64; 3]> =
         arrays.seam_position.iter().map(key).collect();
     let mut needed = vec![false; arrays.positions.len()];
-    for h in (0..surface.halfedges()).filter(|h| is_border(*h)) {
+    for &h in border {
         if with_boundary || surface.twin(h).is_some() {
             needed[surface.tail(h)] = true;
             needed[surface.head(h)] = true;

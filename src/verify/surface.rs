@@ -18,6 +18,8 @@ pub(super) struct Surface<'a> {
     pub on_boundary: Vec<bool>,
     corner_start: Vec<u32>,
     corners: Vec<u32>,
+    /// Of every vertex: into how many fans its faces fall.
+    pub fans_of: Vec<u32>,
     /// Halfedges that share both ends with another of the same direction, or that end where they begin.
     pub doubled: usize,
 }
@@ -31,6 +33,7 @@ impl<'a> Surface<'a> {
             on_boundary: vec![false; arrays.positions.len()],
             corner_start: vec![0; arrays.positions.len() + 1],
             corners: vec![0; 3 * faces.len()],
+            fans_of: Vec::new(),
             doubled: 0,
         };
         surface.pair(arrays.flat_length.as_flattened());
@@ -52,35 +55,32 @@ impl<'a> Surface<'a> {
             surface.corners[next[*v as usize] as usize] = corner as u32;
             next[*v as usize] += 1;
         }
-        surface
+        let fans = (0..arrays.positions.len()).map(|v| surface.fans(v, |_| true) as u32);
+        let fans_of = fans.collect();
+        Surface { fans_of, ..surface }
     }
 
     /// Pairs opposite halfedges; among several of the same ends, those whose lengths are nearest.
     fn pair(&mut self, length: &[f64]) {
-        let mut keys: Vec<(u32, u32, u32)> = (0..self.halfedges())
-            .map(|h| {
-                let (a, b) = (self.tail(h) as u32, self.head(h) as u32);
-                (a.min(b), a.max(b), h as u32)
-            })
-            .collect();
-        keys.sort_unstable();
-        for group in keys.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
-            if group[0].0 == group[0].1 {
+        let (faces, vertices) = (self.faces, self.on_boundary.len());
+        by_ends(faces, vertices, |low, group| {
+            let high = group[0].0;
+            if low == high {
                 self.doubled += group.len();
-                continue;
+                return;
             }
             // Nearly every edge: one face on each side.
-            if let [(_, _, h), (_, _, t)] = *group
+            if let [(_, h), (_, t)] = *group
                 && self.tail(h as usize) != self.tail(t as usize)
             {
                 self.twin[h as usize] = t;
                 self.twin[t as usize] = h;
-                continue;
+                return;
             }
             let (mut back, forth): (Vec<u32>, Vec<u32>) = group
                 .iter()
-                .map(|key| key.2)
-                .partition(|h| self.tail(*h as usize) as u32 == group[0].1);
+                .map(|key| key.1)
+                .partition(|h| self.tail(*h as usize) as u32 == high);
             self.doubled += forth.len().saturating_sub(1) + back.len().saturating_sub(1);
             for h in forth {
                 let gap = |t: &u32| (length[*t as usize] - length[h as usize]).abs();
@@ -95,7 +95,7 @@ impl<'a> Surface<'a> {
                     self.twin[t as usize] = h;
                 }
             }
-        }
+        });
     }
 
     pub fn halfedges(&self) -> usize {
@@ -147,6 +147,49 @@ impl<'a> Surface<'a> {
         &self.corners[self.corner_start[v] as usize..self.corner_start[v + 1] as usize]
     }
 
+    /// Into how many fans the faces at a vertex fall: what hangs together across the edges whose halfedge that leaves `passes` lets through.
+    pub fn fans(&self, v: usize, passes: impl Fn(usize) -> bool) -> usize {
+        let corners = self.corners_of(v);
+        let ahead = |corner: usize| {
+            let twin = self.twin(self.incoming(corner)).filter(|t| passes(*t))?;
+            Some(self.tail_corner(twin))
+        };
+        let behind = |corner: usize| {
+            let outgoing = self.outgoing(corner);
+            let twin = self.twin(outgoing).filter(|_| passes(outgoing))?;
+            Some(self.head_corner(twin))
+        };
+        let Some(first) = corners.first().map(|c| *c as usize) else {
+            return 0;
+        };
+        // Both steps undo each other, so a walk comes to an end or back to where it began.
+        let mut met = 1;
+        let mut end = ahead(first);
+        while let Some(corner) = end.filter(|c| *c != first) {
+            met += 1;
+            end = ahead(corner);
+        }
+        if end.is_none() {
+            let mut start = behind(first);
+            while let Some(corner) = start {
+                met += 1;
+                start = behind(corner);
+            }
+        }
+        if met == corners.len() {
+            return 1;
+        }
+        let mut fans = UnionFind::new(corners.len());
+        for (at, corner) in corners.iter().enumerate() {
+            let next =
+                ahead(*corner as usize).and_then(|c| corners.binary_search(&(c as u32)).ok());
+            if let Some(next) = next {
+                fans.join(at, next);
+            }
+        }
+        fans.sets()
+    }
+
     /// Pairs of halfedges, each once.
     pub fn inner_edges(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         (0..self.halfedges()).filter_map(|h| self.twin(h).filter(|t| h < *t).map(|t| (h, t)))
@@ -163,6 +206,39 @@ impl<'a> Surface<'a> {
 
     pub fn euler_characteristic(&self) -> i64 {
         self.vertices_used() as i64 - self.edges() as i64 + self.faces.len() as i64
+    }
+}
+
+/// Tells every group of halfedges that have both ends in common, whichever way they run: the lower end, and of each its higher end and its number, ascending.
+/// Vertices are sorted into buckets by counting, as a bucket holds but a few edges.
+pub(super) fn by_ends(
+    faces: &[[u32; 3]],
+    vertices: usize,
+    mut tell: impl FnMut(u32, &[(u32, u32)]),
+) {
+    let sides = |face: &[u32; 3]| [1, 2, 0].map(|k| (face[k], face[(k + 1) % 3]));
+    let mut start = vec![0u32; vertices + 1];
+    for (a, b) in faces.iter().flat_map(sides) {
+        start[a.min(b) as usize + 1] += 1;
+    }
+    for v in 0..vertices {
+        start[v + 1] += start[v];
+    }
+    let mut entries = vec![(0, 0); 3 * faces.len()];
+    for (h, (a, b)) in (0u32..).zip(faces.iter().flat_map(sides)) {
+        // Every start moves to the end of its bucket, which is where the next one began.
+        let slot = &mut start[a.min(b) as usize];
+        entries[*slot as usize] = (a.max(b), h);
+        *slot += 1;
+    }
+    let mut from = 0;
+    for (v, to) in (0u32..).zip(&start[..vertices]) {
+        let bucket = &mut entries[from..*to as usize];
+        from = *to as usize;
+        bucket.sort_unstable();
+        for group in bucket.chunk_by(|x, y| x.0 == y.0) {
+            tell(v, group);
+        }
     }
 }
 
@@ -232,22 +308,11 @@ pub(super) fn check(
         chi == stated.euler_characteristic,
         chi,
     );
-    let mut fans = UnionFind::new(3 * faces);
     let mut sheets = UnionFind::new(faces);
     for (h, t) in surface.inner_edges() {
-        fans.join(surface.tail_corner(h), surface.head_corner(t));
-        fans.join(surface.head_corner(h), surface.tail_corner(t));
         sheets.join(h / 3, t / 3);
     }
-    let pinched = (0..vertices)
-        .filter(|v| {
-            let corners = surface.corners_of(*v);
-            let first = corners.first().map(|c| fans.find(*c as usize));
-            corners
-                .iter()
-                .any(|c| Some(fans.find(*c as usize)) != first)
-        })
-        .count();
+    let pinched = surface.fans_of.iter().filter(|fans| **fans > 1).count();
     verdicts.note("vertices are manifold", pinched == 0, pinched);
     let mut border = UnionFind::new(vertices);
     for h in (0..surface.halfedges()).filter(|h| surface.twin(*h).is_none()) {
@@ -286,5 +351,21 @@ mod tests {
         sets.join(4, 3);
         assert_eq!(sets.sets(), 3);
         assert_eq!(sets.find(4), 1);
+    }
+
+    #[test]
+    fn edges_are_grouped_by_their_ends() {
+        let faces = [[0, 1, 2], [2, 1, 3], [1, 1, 3]];
+        let mut groups = Vec::new();
+        by_ends(&faces, 5, |low, group| groups.push((low, group.to_vec())));
+        let expected = [
+            (0, vec![(1, 2)]),
+            (0, vec![(2, 1)]),
+            (1, vec![(1, 8)]),
+            (1, vec![(2, 0), (2, 5)]),
+            (1, vec![(3, 3), (3, 6), (3, 7)]),
+            (2, vec![(3, 4)]),
+        ];
+        assert_eq!(groups, expected);
     }
 }
