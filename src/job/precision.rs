@@ -1,14 +1,16 @@
 //! Why an atlas that was built did not pass its checks, where float64 is too coarse for it.
 //!
 //! *Enters:* the checks that failed, the atlas, and the file it was made from. *Leaves:* the most striking figure of what 16 digits do not hold,
-//! with what to change: faces too thin for their lengths to tell their angles, faces too small beside the mesh for coordinates, or scales too far
-//! apart; nothing where the surface has none of them, so that the fault is not in the mesh.
+//! with what to change: faces too thin for their lengths to tell their angles, faces too small beside the mesh for coordinates, scales too far
+//! apart, or slivers where two triangulations cross; nothing where the surface has none of them, so that the fault is not in the mesh.
 //!
 //! It only words a refusal. Whether there is one, the checks decide: many meshes with such faces are built.
 
 use super::error::{failed_of, listed};
 use crate::atlas::develop::diameter;
+use crate::geometry::ids::FaceId;
 use crate::geometry::mesh::{Soup, bounding_box, distance, triangle_area};
+use crate::geometry::triangle::area;
 use crate::product::AffineAtlas;
 use crate::verify::Verdicts;
 
@@ -18,6 +20,10 @@ const THIN: f64 = 1e-7;
 
 /// Faces this small, as a part of the mesh or of the chart, have coordinates of less than four digits.
 const SMALL: f64 = 1e-12;
+
+/// Faces of the refined surface this thin, in the flat metric, blur the angles at their corners as those of [`THIN`] do, since their lengths are
+/// differences of those of larger faces.
+const SLIVER: f64 = 1e-6;
 
 /// Log scales this far apart leave the smallest parts of the atlas less than eight digits beside the largest.
 const APART: f64 = 18.0;
@@ -65,6 +71,18 @@ pub enum Cause {
         /// How many are too small.
         faces: usize,
     },
+    /// The mesh and the triangulation of its flat metric cross so that slivers are left.
+    #[error(
+        "the flat triangulation is far from the mesh's own, and where they cross slivers are left, in face {face} of the mesh one only {width:.1e} times as wide as long, and {faces} are below {SLIVER:.0e}, where errors of rounding add up; ask for more or weaker cones, which change the triangulation less, or divide long thin faces of the mesh"
+    )]
+    Sliver {
+        /// Face of the file in which the thinnest sliver lies.
+        face: u32,
+        /// Its height by its longest side, in the flat metric.
+        width: f64,
+        /// How many are too thin.
+        faces: usize,
+    },
     /// The flat metric has scales too far apart.
     #[error(
         "the flat metric scales lengths by factors e^{range:.0} apart, so that parts of it are too small for coordinates with 16 digits (its smallest face, in face {face} of the mesh, has {size:.1e} of the chart's size); ask for other or more cones (`affine-atlas cones` shows what they gain): a long thin part needs cones of 2π together at each end (cones.list), and noise or spikes are better smoothed away"
@@ -84,7 +102,8 @@ impl Precision {
     pub(super) fn of(verdicts: &Verdicts, atlas: &AffineAtlas, soup: &Soup) -> Option<Self> {
         let cause = thin(atlas, soup)
             .or_else(|| small(atlas, soup))
-            .or_else(|| apart(atlas))?;
+            .or_else(|| apart(atlas))
+            .or_else(|| sliver(atlas))?;
         let failed = failed_of(verdicts);
         Some(Self {
             failed: failed.len(),
@@ -145,6 +164,19 @@ fn small(atlas: &AffineAtlas, soup: &Soup) -> Option<Cause> {
     let sizes = faces(atlas, soup).map(|(face, p)| (face, longest(p) / whole));
     let (face, size, faces) = least(sizes, SMALL)?;
     Some(Cause::Small { face, size, faces })
+}
+
+fn sliver(atlas: &AffineAtlas) -> Option<Cause> {
+    let c = &atlas.mesh.connectivity;
+    let width = |f: FaceId| {
+        // Lengths are opposite corners, edges begin at them.
+        let [a, b, d] = c.face_halfedges(f).map(|h| atlas.metric.length[c.edge(h)]);
+        let longest = a.max(b).max(d);
+        let area = area([b, d, a].map(|l| l / longest)).unwrap_or(0.0);
+        (atlas.mesh.source_face[f], 2.0 * area)
+    };
+    let (face, width, faces) = least(c.faces().map(width), SLIVER)?;
+    Some(Cause::Sliver { face, width, faces })
 }
 
 fn apart(atlas: &AffineAtlas) -> Option<Cause> {

@@ -75,10 +75,10 @@ type Mesh = fn() -> (shapes::Points, shapes::Faces);
 /// Files below a megabyte that once cost more than they may, or are of a kind that could.
 /// With what the message must say where they cannot be built.
 const GENERATED: [(&str, Mesh, &str); 12] = [
-    ("fan", || shapes::fan(4000), ""),
-    ("polygon", || shapes::polygon(8000), ""),
-    ("bipyramid", || shapes::bipyramid(1000), ""),
-    ("components", || shapes::tetrahedra(200), ""),
+    ("fan", || shapes::fan(2000), ""),
+    ("polygon", || shapes::polygon(3000), ""),
+    ("bipyramid", || shapes::bipyramid(500), ""),
+    ("components", || shapes::tetrahedra(64), ""),
     ("soup", || shapes::soup(900, 3000), ""),
     ("noise", || shapes::noisy(5.0), ""),
     ("needles", || shapes::with_needles(1e-12), ""),
