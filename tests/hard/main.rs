@@ -5,7 +5,7 @@
 //! seconds and 2 GB, of a file below a megabyte 1 GB.
 //!
 //! `cargo test --release --test hard` builds generated meshes with defaults, and where `AFFINE_ATLAS_CORPUS` names a folder with `hard/` below it,
-//! all its files too (ignored otherwise). `… -- --ignored hard/` builds these with all configurations, about an hour of one core;
+//! all its files too (ignored otherwise). `… -- --ignored hard/` builds these with all configurations, which is slow;
 //! `hard/CONFIGURATION/` with one of them, `hard/CONFIGURATION/FILE` one pair. Each prints a line of a table; a run with fewer threads than cores
 //! says more of time. `AFFINE_ATLAS_CHECKER` and `AFFINE_ATLAS_PYTHON` as in `tests/corpus.rs`.
 
