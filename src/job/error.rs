@@ -1,5 +1,6 @@
 //! Every way in which a build can end without an atlas.
 
+use super::precision::Precision;
 use crate::atlas::charts::ChartError;
 use crate::atlas::cut::CutError;
 use crate::atlas::develop::DevelopError;
@@ -59,6 +60,9 @@ pub enum BuildError {
     /// What was written did not pass its own checks, and was not published.
     #[error(transparent)]
     Unverified(#[from] Unverified),
+    /// The same, because float64 is too coarse for the surface.
+    #[error(transparent)]
+    Precision(#[from] Precision),
     /// Nothing could be written.
     #[error(transparent)]
     Export(ExportError),
@@ -70,7 +74,7 @@ pub enum BuildError {
 /// An atlas that does not pass [`verify`](crate::verify): the checks that failed, with their figures.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the atlas did not pass {} of its {checks} checks and was not published ({}); mend what `affine-atlas explain` shows of the mesh (very thin faces, vertices that nearly coincide; repair.weld_tolerance merges such ones on open borders), or ask for weaker or more cones",
+    "the atlas did not pass {} of its {checks} checks and was not published ({}), though nothing of the mesh is too thin or too small; please report the mesh with its configuration, and try other cones (cones.count) or flow.scheme = \"vertex-scaling\" with flow.delaunay = true, if others are set",
     failed.len(),
     listed(failed)
 )]
@@ -84,17 +88,21 @@ pub struct Unverified {
 impl Unverified {
     /// What failed of these verdicts; `None` where nothing did.
     pub fn of(verdicts: &Verdicts) -> Option<Self> {
-        let failed = verdicts.checks.iter().filter(|check| !check.passed);
-        let failed: Vec<Check> = failed.cloned().collect();
-        (!verdicts.all_passed()).then_some(Self {
-            failed,
+        (!verdicts.all_passed()).then(|| Self {
+            failed: failed_of(verdicts),
             checks: verdicts.checks.len(),
         })
     }
 }
 
+/// The checks that failed.
+pub(super) fn failed_of(verdicts: &Verdicts) -> Vec<Check> {
+    let failed = verdicts.checks.iter().filter(|check| !check.passed);
+    failed.cloned().collect()
+}
+
 /// The first failed checks with their figures.
-fn listed(failed: &[Check]) -> String {
+pub(super) fn listed(failed: &[Check]) -> String {
     let shown = failed.iter().take(LISTED_CHECKS);
     let mut words: Vec<String> = shown.map(|c| format!("{}: {}", c.name, c.figure)).collect();
     if failed.len() > LISTED_CHECKS {
@@ -141,6 +149,7 @@ impl BuildError {
             }
             BuildError::Rectangle(_) => FailureKind::Internal,
             BuildError::Unverified(_) => FailureKind::Unverified,
+            BuildError::Precision(_) => FailureKind::NotConverged,
             BuildError::Export(error) if error.is_internal() => FailureKind::Internal,
             BuildError::Export(_) => FailureKind::Output,
             BuildError::Cancelled => FailureKind::Internal,

@@ -11,14 +11,19 @@ pub mod fit;
 mod flatten;
 mod inspect;
 mod listing;
+mod precision;
+mod publication;
 pub mod rebuild;
+mod shares;
 pub mod survey;
 pub mod texture;
 
 pub use error::{BuildError, Unverified};
 pub use inspect::{Inspection, inspect};
+pub use precision::{Cause, Precision};
 
 use flatten::{Flattened, flatten, refine_for};
+use publication::Publication;
 
 use crate::atlas::develop::Development;
 use crate::atlas::geometry_image::SourceSurface;
@@ -26,19 +31,17 @@ use crate::atlas::patches::Domain;
 use crate::atlas::rectangles::Charted;
 use crate::atlas::{charts, develop, geometry_image, patches, rectangles};
 use crate::config::Config;
-use crate::export::folder::{Staging, component_name, list_files};
-use crate::export::{self, ExportError, Provenance, pictures, report as report_page};
+use crate::export::folder::list_files;
 use crate::flow::cones::{self, Requests};
 use crate::geometry::deviation::{Triangles, distances};
 use crate::geometry::mesh::Soup;
 use crate::observe::Observer;
 use crate::outcome::{AssetOutcome, AssetState, ComponentOutcome, Failure, Summary};
 use crate::product::AffineAtlas;
-use crate::read::{self, SourceAsset};
+use crate::read;
 use crate::rebuild::Images;
 use crate::repair::{self, Component};
 use crate::report;
-use crate::verify::{VerifyOptions, verify_atlas};
 use std::path::Path;
 use std::time::Instant;
 
@@ -50,6 +53,31 @@ pub fn build(
     config: &Config,
     observer: &dyn Observer,
 ) -> Result<Vec<Result<AffineAtlas, BuildError>>, BuildError> {
+    let mut atlases = Vec::new();
+    each(soup, config, observer, |part| {
+        atlases.push(part.atlas);
+        Ok(())
+    })?;
+    Ok(atlases)
+}
+
+/// What became of one component.
+struct Part<'a> {
+    index: usize,
+    /// Of the mesh.
+    components: usize,
+    /// With its share of texels and pixels.
+    config: &'a Config,
+    atlas: Result<AffineAtlas, BuildError>,
+}
+
+/// Builds one component after the other and hands each on before it begins the next, so that no more than one atlas need be in memory.
+fn each(
+    soup: &Soup,
+    config: &Config,
+    observer: &dyn Observer,
+    mut take: impl FnMut(Part<'_>) -> Result<(), BuildError>,
+) -> Result<(), BuildError> {
     observer.stage("repair", 0, 1);
     let repaired = repair::repair(soup, &config.repair)?;
     let requests = cones::assign(&repaired, &config.cones, &config.boundary)?;
@@ -57,19 +85,25 @@ pub fn build(
         images: config.images.held_by(soup),
         ..config.clone()
     };
-    let count = repaired.components.len();
-    let parts = repaired.components.into_iter().zip(requests).enumerate();
-    Ok(parts
-        .map(|(i, (component, requests))| {
-            let stages = Observed {
-                observer,
-                component: i,
-                components: count,
-            };
-            let enter = |stage| stages.enter(stage);
-            build_component(component, &requests, config, observer, enter)
-        })
-        .collect())
+    let shares = shares::shares(&repaired.components);
+    let components = repaired.components.len();
+    let parts = repaired.components.into_iter().zip(requests).zip(shares);
+    for (index, ((component, requests), share)) in parts.enumerate() {
+        let config = &shares::of_share(config, share);
+        let stages = Observed {
+            observer,
+            component: index,
+            components,
+        };
+        let enter = |stage| stages.enter(stage);
+        take(Part {
+            index,
+            components,
+            config,
+            atlas: build_component(component, &requests, config, observer, enter),
+        })?;
+    }
+    Ok(())
 }
 
 /// Who watches which component.
@@ -245,51 +279,41 @@ fn run_stages(
         tracing::warn!(asset = outcome.id, channel = channel.name(), "{note}");
         outcome.notes.push(note);
     }
-    let mut atlases = build(&asset.soup, config, observer)?;
-    if atlases
-        .iter()
-        .any(|a| matches!(a, Err(BuildError::Cancelled)))
-    {
-        return Err(BuildError::Cancelled);
-    }
-    for (index, atlas) in atlases.iter().enumerate() {
-        for note in atlas.iter().flat_map(|atlas| warnings(atlas, config)) {
-            let note = match atlases.len() {
-                1 => format!("{given} {note}"),
-                _ => format!("component {index} of {given} {note}"),
-            };
-            tracing::warn!(asset = outcome.id, "{note}");
-            outcome.notes.push(note);
-        }
-    }
     let folder = output.join(&outcome.id);
-    if atlases.iter().any(Result::is_ok) {
-        let unverified = write(
-            &asset,
-            given,
-            output,
-            &outcome.id,
-            config,
-            &atlases,
-            observer,
-        )?;
-        for (component, error) in unverified {
-            atlases[component] = Err(error.into());
-        }
-    }
+    let id = outcome.id.clone();
+    let mut publication = Publication::new(&asset, given, output, &id, config, observer);
+    let mut parts = Vec::new();
+    each(&asset.soup, config, observer, |part| {
+        let Part {
+            index, components, ..
+        } = part;
+        let result = match part.atlas {
+            Err(BuildError::Cancelled) => return Err(BuildError::Cancelled),
+            Err(error) => {
+                publication.leave_out(index, components);
+                Err(error)
+            }
+            Ok(atlas) => {
+                for note in warnings(&atlas, part.config) {
+                    let note = match components {
+                        1 => format!("{given} {note}"),
+                        _ => format!("component {index} of {given} {note}"),
+                    };
+                    tracing::warn!(asset = id, "{note}");
+                    outcome.notes.push(note);
+                }
+                let folder = folder.join(Publication::subfolder(index, components));
+                let added = publication.add(index, components, &atlas, part.config)?;
+                added.map(|()| Summary::of(&atlas, folder))
+            }
+        };
+        let result = result.map_err(|error| Failure::from(&error));
+        parts.push(ComponentOutcome { index, result });
+        Ok(())
+    })?;
+    publication.finish()?;
     outcome.files = list_files(&folder).unwrap_or_default();
-    let several = atlases.len() > 1;
-    for (index, atlas) in atlases.iter().enumerate() {
-        let folder = match several {
-            true => folder.join(component_name(index)),
-            false => folder.clone(),
-        };
-        let result = match atlas {
-            Ok(atlas) => Ok(Summary::of(atlas, folder)),
-            Err(error) => Err(Failure::from(error)),
-        };
-        outcome.components.push(ComponentOutcome { index, result });
-    }
+    outcome.components = parts;
     Ok(())
 }
 
@@ -319,70 +343,4 @@ fn warnings(atlas: &AffineAtlas, config: &Config) -> Vec<String> {
         ));
     }
     notes
-}
-
-/// Writes all components into one folder that replaces the older one in one step. What does not pass the checks of [`verify`] is not
-/// published and given back, by component; an older one stays in its place.
-fn write(
-    asset: &SourceAsset,
-    given: &str,
-    output: &Path,
-    id: &str,
-    config: &Config,
-    atlases: &[Result<AffineAtlas, BuildError>],
-    observer: &dyn Observer,
-) -> Result<Vec<(usize, Unverified)>, ExportError> {
-    let go_on = || match observer.cancelled() {
-        true => Err(ExportError::Interrupted),
-        false => Ok(()),
-    };
-    let staging = Staging::begin(output, id)?;
-    let config_blake3 = config.hash();
-    let (mut unverified, mut new) = (Vec::new(), false);
-    for (component, atlas) in atlases.iter().enumerate() {
-        let subfolder = match atlases.len() {
-            1 => String::new(),
-            _ => component_name(component),
-        };
-        let Ok(atlas) = atlas else {
-            staging.keep_previous(&subfolder)?;
-            continue;
-        };
-        let provenance = Provenance {
-            path: given,
-            blake3: &asset.blake3,
-            config_blake3: &config_blake3,
-            component,
-            components: atlases.len(),
-            parts: &asset.soup.parts,
-            appearance: &asset.soup.appearance,
-            asset: id,
-        };
-        observer.stage("write", component, atlases.len());
-        export::write_component(&staging, &subfolder, atlas, &provenance)?;
-        go_on()?;
-        observer.stage("verify", component, atlases.len());
-        let written = staging.path().join(&subfolder);
-        let verdicts = verify_atlas(&written, &VerifyOptions::default(), None);
-        if let Some(error) = Unverified::of(&verdicts) {
-            unverified.push((component, error));
-            staging.withdraw(&subfolder)?;
-            continue;
-        }
-        new = true;
-        go_on()?;
-        observer.stage("pages", component, atlases.len());
-        if config.pictures.enabled {
-            pictures::write(&staging, &subfolder, atlas, config.pictures.size)?;
-        }
-        go_on()?;
-        if config.report.enabled {
-            report_page::write(&staging, &subfolder, atlas, &provenance, &config.report)?;
-        }
-        go_on()?;
-    }
-    if new {
-        staging.publish()?;
-    }
-    Ok(unverified)
 }

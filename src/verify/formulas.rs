@@ -299,12 +299,12 @@ pub(super) fn bounds3<'a>(points: impl IntoIterator<Item = &'a Point3>) -> (Poin
 }
 
 /// Whether a face is counterclockwise, up to what double precision can tell of a sliver at coordinates as
-/// large as `reach`. A face so small that its corners coincide there is not flipped.
+/// large as `reach`. A face so small that its corners coincide there has no orientation.
 pub(super) fn is_positive(t: [Point2; 3], reach: f64) -> bool {
     let area = doubled_area2(t);
-    area >= 0.0 || {
+    area > 0.0 || {
         let l = longest(lengths2(t));
-        area >= -1e-14 * l * l - 1e-13 * reach * l
+        l > 0.0 && area >= -1e-14 * l * l - 1e-13 * reach * l
     }
 }
 
@@ -393,5 +393,6 @@ mod tests {
         assert!(!is_positive([good[0], good[2], good[1]], 1.0));
         assert!(is_positive([[0.0, 0.0], [1.0, 0.0], [0.5, -1e-15]], 1.0));
         assert!(!is_positive([[0.0, 0.0], [1.0, 0.0], [0.5, -1e-9]], 1.0));
+        assert!(!is_positive([[0.5, 0.25]; 3], 1.0));
     }
 }

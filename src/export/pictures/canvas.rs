@@ -53,8 +53,18 @@ impl Canvas {
             let high = (a[k].max(b[k]) + radius).ceil().clamp(0.0, end[k] as f64);
             low..high as usize
         };
+        let columns = range(0);
+        let half = radius * length2.sqrt() / axis[1].abs();
         for row in range(1) {
-            for column in range(0) {
+            // Where the row comes as near as that to the whole line, and a sample more; casts saturate.
+            let middle = a[0] + axis[0] * (row as f64 + 0.5 - a[1]) / axis[1] - 0.5;
+            let (from, to) = match (middle - half, middle + half) {
+                (from, to) if from.is_finite() && to.is_finite() => {
+                    ((from - 1.0) as usize, (to + 2.0) as usize)
+                }
+                _ => (columns.start, columns.end),
+            };
+            for column in columns.start.max(from)..columns.end.min(to) {
                 let d = [column as f64 + 0.5 - a[0], row as f64 + 0.5 - a[1]];
                 let along = d[0] * axis[0] + d[1] * axis[1];
                 let t = if length2 > 0.0 {

@@ -1,5 +1,7 @@
 //! Which triangle does a sample see? A depth-buffered rasteriser that leaves shading for later.
 
+use std::ops::Range;
+
 /// What stands where no triangle is seen.
 pub const NOTHING: u32 = u32::MAX;
 
@@ -102,7 +104,7 @@ pub fn covered(
             .each_ref()
             .map(|side| side.run[0] * (y - side.from[1]));
         let mut entered = false;
-        for column in columns.clone() {
+        for column in between(&columns, &sides, &rises) {
             let x = column as f64 + 0.5;
             let parts = [0, 1, 2].map(|k| sides[k].part(x, rises[k]));
             if let [Some(x), Some(y), Some(z)] = parts {
@@ -117,6 +119,27 @@ pub fn covered(
             }
         }
     }
+}
+
+/// The columns of a row that may lie inside: where the sides meet the row, and a sample more at both ends, so that [`Side::part`] alone
+/// decides. Walking over the whole box of a long thin triangle takes as long as filling it.
+fn between(columns: &Range<usize>, sides: &[Side; 3], rises: &[f64; 3]) -> Range<usize> {
+    let (mut low, mut high) = (columns.start as f64, columns.end as f64);
+    for (side, &rise) in sides.iter().zip(rises) {
+        let along = rise / side.run[1];
+        if !along.is_finite() {
+            continue;
+        }
+        let column = side.from[0] + along - 0.5;
+        let slack = 1.0 + 1e-12 * (along.abs() + side.from[0].abs());
+        // The distance falls from left to right where the side rises.
+        match side.inward_is_positive == (side.run[1] > 0.0) {
+            true => high = high.min(column + slack + 1.0),
+            false => low = low.max(column - slack),
+        }
+    }
+    // Casts saturate.
+    low as usize..high as usize
 }
 
 /// The line through two corners of a triangle.

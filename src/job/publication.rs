@@ -1,0 +1,135 @@
+//! The folder of an asset, filled component by component.
+//!
+//! *Enters:* one atlas after the other. *Leaves:* a folder that replaces the older one in one step. What does not pass the checks of
+//! [`verify`](crate::verify) is not published; an older one stays in its place.
+
+use super::error::{BuildError, Unverified};
+use super::precision::Precision;
+use crate::config::Config;
+use crate::export::folder::{Staging, component_name};
+use crate::export::{self, ExportError, Provenance, pictures, report as report_page};
+use crate::observe::Observer;
+use crate::product::AffineAtlas;
+use crate::read::SourceAsset;
+use crate::verify::{VerifyOptions, verify_atlas};
+use std::path::Path;
+
+/// What all components of an asset are written with.
+pub(super) struct Publication<'a> {
+    asset: &'a SourceAsset,
+    given: &'a str,
+    output: &'a Path,
+    id: &'a str,
+    config_blake3: String,
+    observer: &'a dyn Observer,
+    /// Made for the first atlas: where there is none, nothing is touched.
+    staging: Option<Staging>,
+    /// Whether any atlas passed.
+    new: bool,
+    /// Subfolders of components that have no atlas.
+    missing: Vec<String>,
+}
+
+impl<'a> Publication<'a> {
+    /// A folder `output/id` that nothing has been written for. `given` is the path as the user wrote it.
+    pub fn new(
+        asset: &'a SourceAsset,
+        given: &'a str,
+        output: &'a Path,
+        id: &'a str,
+        config: &Config,
+        observer: &'a dyn Observer,
+    ) -> Self {
+        Self {
+            asset,
+            given,
+            output,
+            id,
+            config_blake3: config.hash(),
+            observer,
+            staging: None,
+            new: false,
+            missing: Vec::new(),
+        }
+    }
+
+    /// Name of a component's folder inside that of the asset; empty where it is the whole asset.
+    pub fn subfolder(component: usize, components: usize) -> String {
+        match components {
+            1 => String::new(),
+            _ => component_name(component),
+        }
+    }
+
+    /// Notes that a component has no atlas: an older one of it stays.
+    pub fn leave_out(&mut self, component: usize, components: usize) {
+        self.missing.push(Self::subfolder(component, components));
+    }
+
+    /// Writes the atlas of a component, checks it and draws it. The inner error says why it is not published.
+    pub fn add(
+        &mut self,
+        component: usize,
+        components: usize,
+        atlas: &AffineAtlas,
+        config: &Config,
+    ) -> Result<Result<(), BuildError>, ExportError> {
+        let observer = self.observer;
+        let go_on = || match observer.cancelled() {
+            true => Err(ExportError::Interrupted),
+            false => Ok(()),
+        };
+        let staging = match &mut self.staging {
+            Some(staging) => &*staging,
+            none => &*none.insert(Staging::begin(self.output, self.id)?),
+        };
+        let subfolder = Self::subfolder(component, components);
+        let provenance = Provenance {
+            path: self.given,
+            blake3: &self.asset.blake3,
+            config_blake3: &self.config_blake3,
+            component,
+            components,
+            parts: &self.asset.soup.parts,
+            appearance: &self.asset.soup.appearance,
+            asset: self.id,
+        };
+        observer.stage("write", component, components);
+        export::write_component(staging, &subfolder, atlas, &provenance)?;
+        go_on()?;
+        observer.stage("verify", component, components);
+        let written = staging.path().join(&subfolder);
+        let verdicts = verify_atlas(&written, &VerifyOptions::default(), None);
+        if let Some(unverified) = Unverified::of(&verdicts) {
+            staging.withdraw(&subfolder)?;
+            let precision = Precision::of(&verdicts, atlas, &self.asset.soup);
+            return Ok(Err(match precision {
+                Some(precision) => precision.into(),
+                None => unverified.into(),
+            }));
+        }
+        self.new = true;
+        go_on()?;
+        observer.stage("pages", component, components);
+        if config.pictures.enabled {
+            pictures::write(staging, &subfolder, atlas, config.pictures.size)?;
+        }
+        go_on()?;
+        if config.report.enabled {
+            report_page::write(staging, &subfolder, atlas, &provenance, &config.report)?;
+        }
+        go_on()?;
+        Ok(Ok(()))
+    }
+
+    /// Puts the folder in place, where any atlas passed.
+    pub fn finish(self) -> Result<(), ExportError> {
+        let Some(staging) = self.staging.filter(|_| self.new) else {
+            return Ok(());
+        };
+        for subfolder in &self.missing {
+            staging.keep_previous(subfolder)?;
+        }
+        staging.publish()
+    }
+}

@@ -1,0 +1,84 @@
+//! What each component of a mesh may cost, where there are many.
+//!
+//! *Enters:* components and a configuration. *Leaves:* for each component a configuration whose texels and pixels go with its part of the mesh's
+//! area, so that hundreds of components do not cost hundreds of times what one does.
+
+use crate::config::Config;
+use crate::export::pictures::SIDE_RANGE;
+use crate::geometry::mesh::triangle_area;
+use crate::repair::Component;
+
+/// A component with at least this part of the area gets all texels and the pictures that the configuration asks for, a smaller one
+/// proportionally fewer and smaller: all together get at most so many times what one does, but for the floors below.
+const WHOLE: f64 = 1.0 / 16.0;
+
+/// No component gets fewer texels: the least that the configuration may ask for.
+const LEAST_TEXELS: usize = 4096;
+
+/// No longer side of a picture gets shorter.
+const LEAST_SIDE: usize = 2 * SIDE_RANGE[0];
+
+/// The part of what the configuration asks for that each component gets, in (0, 1].
+pub(super) fn shares(components: &[Component]) -> Vec<f64> {
+    let area = |component: &Component| {
+        let Ok(mesh) = &component.mesh else {
+            return 0.0;
+        };
+        let faces = mesh.connectivity.faces();
+        let corners = |f| {
+            mesh.connectivity
+                .face_vertices(f)
+                .map(|v| mesh.positions[v])
+        };
+        component
+            .frame
+            .area(faces.map(|f| triangle_area(corners(f))).sum())
+    };
+    let areas: Vec<f64> = components.iter().map(area).collect();
+    let whole = WHOLE * areas.iter().sum::<f64>();
+    // Areas that float64 does not hold tell nothing.
+    let share = |area: f64| match whole.is_normal() {
+        true => (area / whole).min(1.0),
+        false => 1.0,
+    };
+    areas.into_iter().map(share).collect()
+}
+
+/// The configuration of a component with this share.
+pub(super) fn of_share(config: &Config, share: f64) -> Config {
+    let mut config = config.clone();
+    let at_least = |whole: usize, part: f64, least: usize| {
+        (whole as f64 * part).round().max(least.min(whole) as f64) as usize
+    };
+    config.patches.texel_budget =
+        at_least(config.patches.texel_budget, share, LEAST_TEXELS).min(config.patches.texel_budget);
+    config.pictures.size =
+        at_least(config.pictures.size, share, LEAST_SIDE).min(config.pictures.size);
+    config
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_components_get_less_down_to_a_floor() {
+        let mut config = Config::default();
+        config.patches.texel_budget = 100_000;
+        config.pictures.size = 1000;
+        let of = |share: f64| {
+            let config = of_share(&config, share);
+            (config.patches.texel_budget, config.pictures.size)
+        };
+        assert_eq!(of(1.0), (100_000, 1000));
+        assert_eq!(of(0.25), (25_000, 250));
+        assert_eq!(of(0.0), (LEAST_TEXELS, LEAST_SIDE));
+        config.patches.texel_budget = 1000;
+        config.pictures.size = 64;
+        let small = of_share(&config, 0.01);
+        assert_eq!(
+            (small.patches.texel_budget, small.pictures.size),
+            (1000, 64)
+        );
+    }
+}
