@@ -94,9 +94,7 @@ const GENERATED: [(&str, Mesh, &str); 12] = [
 ];
 
 fn main() {
-    let mut arguments = Arguments::from_args();
-    // What children cost is counted for all together.
-    arguments.test_threads = Some(1);
+    let arguments = Arguments::from_args();
     let mut trials = Vec::new();
     for (name, mesh, words) in GENERATED {
         let run = move || {
@@ -168,7 +166,7 @@ fn pair(mesh: &Path, configuration: &str, settings: &[&str], words: &str) -> Res
     for setting in always.chain(plain).chain(settings) {
         command.arg("--set").arg(setting);
     }
-    let (output, cost) = measured(&mut command)?;
+    let (output, cost) = measured(&command)?;
     let manifest = std::fs::read_to_string(folder.path().join("manifest.jsonl"));
     let Ok(manifest) = manifest else {
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
