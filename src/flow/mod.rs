@@ -16,3 +16,4 @@ mod scale;
 pub mod schemes;
 pub mod solve;
 pub mod step;
+pub mod vertex_scale;

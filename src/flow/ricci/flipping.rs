@@ -120,6 +120,7 @@ pub(super) fn flow(
             front_faces: surface.connectivity.face_count(),
             delaunay: b,
             delaunay_length,
+            delaunay_penner: None,
             flat: delaunay.connectivity,
             penner,
             u,
