@@ -14,7 +14,7 @@ use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::Solve;
 use faer::perm::PermRef;
-use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::{SupernodalThreshold, amd};
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
     factorize_symbolic_cholesky,
@@ -84,19 +84,30 @@ impl SymmetricSolver {
     /// off-diagonal entries `pairs`, each named once for both triangles. A pair may occur several times (its
     /// values are added); a pair of equal indices adds to the diagonal.
     pub fn new(size: usize, pairs: &[[u32; 2]]) -> Result<Self, SolveError> {
-        Self::ordered(size, pairs, None)
+        Self::ordered(size, pairs, Order::LeastDegree { border: 0 })
+    }
+
+    /// The same for a matrix whose last `border` unknowns are coupled with very many others each: they are eliminated last, and the others
+    /// are ordered as if there were none.
+    pub fn with_border(
+        size: usize,
+        border: usize,
+        pairs: &[[u32; 2]],
+    ) -> Result<Self, SolveError> {
+        Self::ordered(size, pairs, Order::LeastDegree { border })
     }
 
     /// The same for a pattern that differs little from this one: the order is kept, which saves most of the
     /// analysis. Where much has changed the factor fills up many times over: then order anew.
     pub fn with_pairs(&self, pairs: &[[u32; 2]]) -> Result<Self, SolveError> {
-        Self::ordered(self.size, pairs, self.symbolic.perm())
+        let order = self.symbolic.perm().map(Order::Given);
+        Self::ordered(self.size, pairs, order.unwrap_or(Order::LeastDegree { border: 0 }))
     }
 
     fn ordered(
         size: usize,
         pairs: &[[u32; 2]],
-        order: Option<PermRef<'_, u32>>,
+        order: Order<'_>,
     ) -> Result<Self, SolveError> {
         let too_large = SolveError::TooLarge { unknowns: size };
         if size >= u32::MAX as usize / 2 || pairs.len() >= u32::MAX as usize / 2 {
@@ -138,7 +149,15 @@ impl SymmetricSolver {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
         };
-        let ordering = order.map_or(SymmetricOrdering::Amd, SymmetricOrdering::Custom);
+        let bordered;
+        let ordering = match order {
+            Order::Given(order) => SymmetricOrdering::Custom(order),
+            Order::LeastDegree { border: 0 } => SymmetricOrdering::Amd,
+            Order::LeastDegree { border } => {
+                bordered = border_last(size, border, &column, &row).ok_or(too_large)?;
+                SymmetricOrdering::Custom(PermRef::new_checked(&bordered.0, &bordered.1, size))
+            }
+        };
         let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, ordering, params)
             .map_err(|_| too_large)?;
         let scratch = StackReq::or(
@@ -224,6 +243,46 @@ impl SymmetricSolver {
             );
         }
     }
+}
+
+/// In which order unknowns are eliminated.
+enum Order<'a> {
+    /// Approximate minimum degree, but for the last `border` unknowns, which come last.
+    LeastDegree { border: usize },
+    Given(PermRef<'a, u32>),
+}
+
+/// A permutation and its inverse: approximate minimum degree of the leading block, then the last `border` unknowns. `column` and `row` are the lower
+/// triangle by columns, ascending. `None` where memory does not suffice.
+fn border_last(
+    size: usize,
+    border: usize,
+    column: &[u32],
+    row: &[u32],
+) -> Option<(Vec<u32>, Vec<u32>)> {
+    let core = size.saturating_sub(border);
+    let mut first = Vec::with_capacity(core + 1);
+    let mut inner = Vec::with_capacity(row.len());
+    for c in 0..core {
+        first.push(inner.len() as u32);
+        let rows = &row[column[c] as usize..column[c + 1] as usize];
+        inner.extend(rows.iter().copied().filter(|&r| (r as usize) < core));
+    }
+    first.push(inner.len() as u32);
+    let pattern = SymbolicSparseColMatRef::new_checked(core, core, &first, None, &inner);
+    let mut order: Vec<u32> = (0..size as u32).collect();
+    let mut place = order.clone();
+    let scratch = amd::order_scratch::<u32>(core, inner.len());
+    let mut memory = MemBuffer::try_new(scratch).ok()?;
+    amd::order(
+        &mut order[..core],
+        &mut place[..core],
+        pattern,
+        amd::Control::default(),
+        MemStack::new(&mut memory),
+    )
+    .ok()?;
+    Some((order, place))
 }
 
 #[cfg(test)]
