@@ -20,4 +20,5 @@ pub mod seamless;
 pub mod signature;
 pub mod solve;
 pub mod step;
+pub mod surface_delaunay;
 pub mod vertex_scale;

@@ -61,6 +61,8 @@ pub struct SeamlessStep {
     pub iteration: usize,
     /// Largest error of a cone angle or a turning, radians.
     pub max_error: f64,
+    /// Half the sum of squares of what is missing, radians squared.
+    pub energy: f64,
     /// Part of the Newton step that was taken.
     pub step: f64,
     /// Flips between the given triangulation and the Delaunay one here.

@@ -47,6 +47,7 @@ impl Shape {
             target,
             cones: list,
             boundary: BoundaryCondition::Free,
+            turning: None,
         }
     }
 

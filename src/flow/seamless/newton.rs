@@ -101,6 +101,7 @@ impl SeamlessStep {
     fn at(self, state: &State) -> Self {
         Self {
             max_error: state.max_error,
+            energy: 0.5 * dot(&state.missing, &state.missing),
             flips: state.flips.len(),
             ..self
         }
