@@ -28,6 +28,7 @@ use crate::flow::signature::Signature;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::EdgeVec;
 use crate::observe::Observer;
+use newton::Reuse;
 use norm::Norm;
 use state::Problem;
 
@@ -57,7 +58,7 @@ impl Default for SeamlessParams {
 /// One line of the convergence record.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SeamlessStep {
-    /// Number of the step, 0 for the start.
+    /// Number of the step, 0 for the start. Further steps with the same factor count as the same.
     pub iteration: usize,
     /// Largest error of a cone angle or a turning, radians.
     pub max_error: f64,
@@ -102,7 +103,7 @@ pub fn seamless(
     let problem = Problem::new(delaunay, loops, signature);
     let start = length.iter().map(|l| 2.0 * l.ln()).collect();
     let norm = Norm::by_area(delaunay, length, params.conformality);
-    let solution = newton::solve(&problem, start, &norm, params, observer)?;
+    let solution = newton::solve(&problem, start, &norm, Reuse::WhereFast, params, observer)?;
     let (mut penner, state) = (solution.penner, solution.state);
     // Flips commute with a common factor.
     let unscaled: EdgeVec<f64> = state.log_length.iter().map(|l| l.exp()).collect();
