@@ -107,7 +107,10 @@ pub fn seamless(
     let (mut penner, state) = (solution.penner, solution.state);
     // Flips commute with a common factor.
     let unscaled: EdgeVec<f64> = state.log_length.iter().map(|l| l.exp()).collect();
-    let area = [total_area(delaunay, length), total_area(&state.connectivity, &unscaled)];
+    let area = [
+        total_area(delaunay, length),
+        total_area(&state.connectivity, &unscaled),
+    ];
     let factor = (area[0] / area[1]).sqrt();
     let shift = 2.0 * factor.ln();
     penner.as_mut_slice().iter_mut().for_each(|l| *l += shift);
@@ -132,7 +135,10 @@ fn check_lengths(c: &Connectivity, length: &EdgeVec<f64>) -> Result<(), Seamless
         let boundary_loops = c.boundary_loops().len();
         return Err(SeamlessError::NotClosed { boundary_loops });
     }
-    match length.enumerate().find(|(_, l)| !(l.is_finite() && **l > 0.0)) {
+    match length
+        .enumerate()
+        .find(|(_, l)| !(l.is_finite() && **l > 0.0))
+    {
         Some((edge, &length)) => Err(SeamlessError::BadLength { edge, length }),
         None => Ok(()),
     }

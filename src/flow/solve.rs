@@ -14,11 +14,11 @@ use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::Solve;
 use faer::perm::PermRef;
-use faer::sparse::linalg::{SupernodalThreshold, amd};
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
+use faer::sparse::linalg::{SupernodalThreshold, amd};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Accum, Conj, MatMut, MatRef, Par, Side, Spec};
 
@@ -89,20 +89,12 @@ impl SymmetricSolver {
 
     /// The same for a matrix whose last `border` unknowns are coupled with very many others each: they are eliminated last, and the others
     /// are ordered as if there were none.
-    pub fn with_border(
-        size: usize,
-        border: usize,
-        pairs: &[[u32; 2]],
-    ) -> Result<Self, SolveError> {
+    pub fn with_border(size: usize, border: usize, pairs: &[[u32; 2]]) -> Result<Self, SolveError> {
         Self::ordered(size, pairs, Order::LeastDegree { border })
     }
 
     /// The same for a matrix of `width` × `width` blocks that are all zero or all given: whole blocks are ordered, which is quicker.
-    pub fn with_blocks(
-        size: usize,
-        width: usize,
-        pairs: &[[u32; 2]],
-    ) -> Result<Self, SolveError> {
+    pub fn with_blocks(size: usize, width: usize, pairs: &[[u32; 2]]) -> Result<Self, SolveError> {
         Self::ordered(size, pairs, Order::Blocks { width })
     }
 
@@ -110,13 +102,28 @@ impl SymmetricSolver {
     /// analysis. Where much has changed the factor fills up many times over: then order anew.
     pub fn with_pairs(&self, pairs: &[[u32; 2]]) -> Result<Self, SolveError> {
         let order = self.symbolic.perm().map(Order::Given);
-        Self::ordered(self.size, pairs, order.unwrap_or(Order::LeastDegree { border: 0 }))
+        Self::ordered(
+            self.size,
+            pairs,
+            order.unwrap_or(Order::LeastDegree { border: 0 }),
+        )
     }
 
-    fn ordered(
+    /// [`with_border`](Self::with_border) for another pattern of as many unknowns, in the memory of this one.
+    pub fn renewed(self, border: usize, pairs: &[[u32; 2]]) -> Result<Self, SolveError> {
+        Self::with_memory(self.size, pairs, Order::LeastDegree { border }, self.factor)
+    }
+
+    fn ordered(size: usize, pairs: &[[u32; 2]], order: Order<'_>) -> Result<Self, SolveError> {
+        Self::with_memory(size, pairs, order, Vec::new())
+    }
+
+    /// `factor`: memory to be used again.
+    fn with_memory(
         size: usize,
         pairs: &[[u32; 2]],
         order: Order<'_>,
+        mut factor: Vec<f64>,
     ) -> Result<Self, SolveError> {
         let too_large = SolveError::TooLarge { unknowns: size };
         if size >= u32::MAX as usize / 2 || pairs.len() >= u32::MAX as usize / 2 {
@@ -178,13 +185,14 @@ impl SymmetricSolver {
             symbolic.solve_in_place_scratch::<f64>(BLOCK, Par::Seq),
         );
         let workspace = MemBuffer::try_new(scratch).map_err(|_| too_large)?;
+        factor.resize(symbolic.len_val(), 0.0);
         Ok(Self {
             size,
             value: vec![0.0; row.len()],
             column,
             row,
             slot,
-            factor: vec![0.0; symbolic.len_val()],
+            factor,
             symbolic,
             workspace,
         })
@@ -261,9 +269,13 @@ impl SymmetricSolver {
 /// In which order unknowns are eliminated.
 enum Order<'a> {
     /// Approximate minimum degree, but for the last `border` unknowns, which come last.
-    LeastDegree { border: usize },
+    LeastDegree {
+        border: usize,
+    },
     /// Approximate minimum degree of blocks of `width` unknowns.
-    Blocks { width: usize },
+    Blocks {
+        width: usize,
+    },
     Given(PermRef<'a, u32>),
 }
 
@@ -306,7 +318,9 @@ fn by_blocks(size: usize, width: usize, column: &[u32], row: &[u32]) -> Option<P
     first.push(inner.len() as u32);
     let (order, place) = least_degree(&first, &inner)?;
     let unknowns = |blocks: Vec<u32>| {
-        let each = blocks.into_iter().flat_map(|b| (0..width).map(move |k| width * b + k));
+        let each = blocks
+            .into_iter()
+            .flat_map(|b| (0..width).map(move |k| width * b + k));
         each.collect()
     };
     Some((unknowns(order), unknowns(place)))

@@ -79,7 +79,11 @@ fn chains(c: &Connectivity) -> Vec<EdgeVec<i64>> {
 
 /// 1 for the halfedge that stands for its edge, −1 for the other.
 fn direction(c: &Connectivity, h: HalfedgeId) -> i64 {
-    if c.edge_halfedge(c.edge(h)) == h { 1 } else { -1 }
+    if c.edge_halfedge(c.edge(h)) == h {
+        1
+    } else {
+        -1
+    }
 }
 
 impl Flipped {
@@ -250,7 +254,9 @@ fn flips_of_cocircular_quads_change_no_turning() {
         let steps = c.edge_vertices(e).map(|v| [v.index() / n, v.index() % n]);
         (0..2).all(|k| steps[0][k] != steps[1][k])
     };
-    let length = c.edges().map(|e| if is_diagonal(e) { 2.0_f64.sqrt() } else { 1.0 });
+    let length = c
+        .edges()
+        .map(|e| if is_diagonal(e) { 2.0_f64.sqrt() } else { 1.0 });
     let mut flipped = Flipped::new(&c, &length.collect());
     let before = flipped.turning();
     let diagonals: Vec<EdgeId> = c.edges().filter(|&e| is_diagonal(e)).collect();

@@ -81,11 +81,25 @@ pub(super) fn solve(
         record.step = step;
         if reuse == Reuse::WhereFast && is_fast {
             let goal = params.tolerance;
-            refine(problem, &mut normal, norm, [goal, FAST_SHARE], &mut penner, &mut state);
+            refine(
+                problem,
+                &mut normal,
+                norm,
+                [goal, FAST_SHARE],
+                &mut penner,
+                &mut state,
+            );
         }
         if state.max_error <= params.tolerance {
             let goal = SETTLED;
-            refine(problem, &mut normal, norm, [goal, POLISHING_SHARE], &mut penner, &mut state);
+            refine(
+                problem,
+                &mut normal,
+                norm,
+                [goal, POLISHING_SHARE],
+                &mut penner,
+                &mut state,
+            );
         }
         history.push(record.at(&state));
         last = Some(normal);
