@@ -357,45 +357,15 @@ mod tests {
     use crate::flow::ricci::shapes;
     use crate::geometry::ids::VertexId;
 
-    /// Faces glued along equal letters; a capital runs the other way. All corners are glued as they must be.
-    fn glued(words: &[&str]) -> Connectivity {
-        let sides: Vec<char> = words.iter().flat_map(|w| w.chars()).collect();
-        let twin: Vec<Option<HalfedgeId>> = sides
-            .iter()
-            .enumerate()
-            .map(|(h, s)| {
-                let other = |o: char| o != *s && o.eq_ignore_ascii_case(s);
-                let t = (0..sides.len()).find(|&t| t != h && other(sides[t]));
-                t.map(HalfedgeId::new)
-            })
-            .collect();
-        // Corners around a vertex by walking.
-        let mut tail = vec![usize::MAX; sides.len()];
-        let mut vertices = 0;
-        for start in 0..sides.len() {
-            let mut h = start;
-            while tail[h] == usize::MAX {
-                tail[h] = vertices;
-                let prev = h - h % 3 + (h % 3 + 2) % 3;
-                h = twin[prev].unwrap().index();
-            }
-            if tail[start] == vertices {
-                vertices += 1;
-            }
-        }
-        let tail: Vec<VertexId> = tail.into_iter().map(VertexId::new).collect();
-        Connectivity::from_gluing(tail.into(), &twin, vertices).unwrap()
-    }
-
     /// One-vertex torus, double of a triangle, a pillow of two self-glued faces (degree-1 vertices), one-vertex genus 2.
     fn tiny() -> Vec<(&'static str, Connectivity)> {
         vec![
-            ("one-vertex torus", glued(&["abc", "ABC"])),
-            ("double of a triangle", glued(&["abc", "CBA"])),
-            ("two-triangle sphere", glued(&["aAb", "BcC"])),
+            ("one-vertex torus", shapes::glued(&["abc", "ABC"])),
+            ("double of a triangle", shapes::glued(&["abc", "CBA"])),
+            ("two-triangle sphere", shapes::glued(&["aAb", "BcC"])),
             (
                 "one-vertex genus 2",
-                glued(&["abx", "XAy", "YBz", "ZcW", "wdv", "VCD"]),
+                shapes::glued(&["abx", "XAy", "YBz", "ZcW", "wdv", "VCD"]),
             ),
         ]
     }

@@ -47,7 +47,9 @@ pub enum FieldError {
     #[error(transparent)]
     Solve(#[from] SolveError),
     /// The cone angle of a vertex is no multiple of π/2: the matching is not one of a field.
-    #[error("the field turns around vertex {vertex} by {residual:e} rad more than a multiple of a quarter turn")]
+    #[error(
+        "the field turns around vertex {vertex} by {residual:e} rad more than a multiple of a quarter turn"
+    )]
     BrokenCone {
         /// Vertex.
         vertex: VertexId,
@@ -55,7 +57,9 @@ pub enum FieldError {
         residual: f64,
     },
     /// The turning of a loop is no multiple of π/2: the matching is not one of a field.
-    #[error("the field turns along loop {of} by {residual:e} rad more than a multiple of a quarter turn")]
+    #[error(
+        "the field turns along loop {of} by {residual:e} rad more than a multiple of a quarter turn"
+    )]
     BrokenLoop {
         /// Loop.
         of: usize,
@@ -63,7 +67,9 @@ pub enum FieldError {
         residual: f64,
     },
     /// There are not enough vertices to spread the curvature over.
-    #[error("the surface has {vertices} vertices only, too few for cones of at least {least} quarter turns: refine the mesh")]
+    #[error(
+        "the surface has {vertices} vertices only, too few for cones of at least {least} quarter turns: refine the mesh"
+    )]
     TooFewVertices {
         /// Number of vertices.
         vertices: usize,

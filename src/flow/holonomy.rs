@@ -112,7 +112,8 @@ impl DualLoops {
             }
             for (i, &way) in ways.iter().enumerate() {
                 let next = ways[(i + 1) % ways.len()];
-                let known = way.enter.index().max(way.leave.index()) < connectivity.halfedge_count();
+                let known =
+                    way.enter.index().max(way.leave.index()) < connectivity.halfedge_count();
                 let is_passage = known
                     && way.enter != way.leave
                     && connectivity.face(way.enter) == connectivity.face(way.leave)
@@ -177,7 +178,11 @@ impl DualLoops {
     }
 
     /// By how much every loop turns, radians. `angle`: three a face, by corner.
-    pub fn turning(&self, connectivity: &Connectivity, angle: impl Fn(HalfedgeId) -> f64) -> Vec<f64> {
+    pub fn turning(
+        &self,
+        connectivity: &Connectivity,
+        angle: impl Fn(HalfedgeId) -> f64,
+    ) -> Vec<f64> {
         (0..self.len())
             .map(|of| {
                 let turns = self.passages(of).map(|way| turn(connectivity, way));
@@ -225,7 +230,10 @@ impl DualLoops {
                     true => (flip.h, flip.t),
                     false => (flip.t, flip.h),
                 };
-                self.passage[p as usize].way = Passage { enter, leave: there };
+                self.passage[p as usize].way = Passage {
+                    enter,
+                    leave: there,
+                };
                 let q = self.insert_after(p, Passage { enter: back, leave });
                 self.enlist(g, q);
             }
@@ -251,7 +259,9 @@ impl DualLoops {
     }
 
     fn insert_after(&mut self, p: u32, way: Passage) -> u32 {
-        let Linked { of, after: next, .. } = self.passage[p as usize];
+        let Linked {
+            of, after: next, ..
+        } = self.passage[p as usize];
         let linked = Linked {
             way,
             of,

@@ -28,6 +28,7 @@ use crate::flow::signature::Signature;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::EdgeVec;
 use crate::observe::Observer;
+use newton::Reuse;
 use norm::Norm;
 use state::Problem;
 
@@ -57,7 +58,7 @@ impl Default for SeamlessParams {
 /// One line of the convergence record.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SeamlessStep {
-    /// Number of the step, 0 for the start.
+    /// Number of the step, 0 for the start. Further steps with the same factor count as the same.
     pub iteration: usize,
     /// Largest error of a cone angle or a turning, radians.
     pub max_error: f64,
@@ -104,11 +105,14 @@ pub fn seamless(
     let problem = Problem::new(delaunay, loops, signature);
     let start = length.iter().map(|l| 2.0 * l.ln()).collect();
     let norm = Norm::by_area(delaunay, length, params.conformality);
-    let solution = newton::solve(&problem, start, &norm, params, observer)?;
+    let solution = newton::solve(&problem, start, &norm, Reuse::WhereFast, params, observer)?;
     let (mut penner, state) = (solution.penner, solution.state);
     // Flips commute with a common factor.
     let unscaled: EdgeVec<f64> = state.log_length.iter().map(|l| l.exp()).collect();
-    let area = [total_area(delaunay, length), total_area(&state.connectivity, &unscaled)];
+    let area = [
+        total_area(delaunay, length),
+        total_area(&state.connectivity, &unscaled),
+    ];
     let factor = (area[0] / area[1]).sqrt();
     let shift = 2.0 * factor.ln();
     penner.as_mut_slice().iter_mut().for_each(|l| *l += shift);
@@ -133,7 +137,10 @@ fn check_lengths(c: &Connectivity, length: &EdgeVec<f64>) -> Result<(), Seamless
         let boundary_loops = c.boundary_loops().len();
         return Err(SeamlessError::NotClosed { boundary_loops });
     }
-    match length.enumerate().find(|(_, l)| !(l.is_finite() && **l > 0.0)) {
+    match length
+        .enumerate()
+        .find(|(_, l)| !(l.is_finite() && **l > 0.0))
+    {
         Some((edge, &length)) => Err(SeamlessError::BadLength { edge, length }),
         None => Ok(()),
     }

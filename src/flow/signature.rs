@@ -34,7 +34,9 @@ pub enum Infeasible {
         needed: usize,
     },
     /// A cone angle is not positive.
-    #[error("vertex {vertex} is to have a cone angle of {quarters} quarter turns, but a cone has at least one")]
+    #[error(
+        "vertex {vertex} is to have a cone angle of {quarters} quarter turns, but a cone has at least one"
+    )]
     BadCone {
         /// Vertex.
         vertex: VertexId,
@@ -42,7 +44,9 @@ pub enum Infeasible {
         quarters: i64,
     },
     /// Gauss–Bonnet (5) is missed.
-    #[error("the curvatures of the cones sum to {prescribed} quarter turns, but the surface needs {required} (4 times its Euler characteristic)")]
+    #[error(
+        "the curvatures of the cones sum to {prescribed} quarter turns, but the surface needs {required} (4 times its Euler characteristic)"
+    )]
     GaussBonnet {
         /// Σ (4 − k).
         prescribed: i64,
@@ -50,7 +54,9 @@ pub enum Infeasible {
         required: i64,
     },
     /// A torus without cones is the plane modulo a lattice.
-    #[error("loop {of} is to turn by {turning} quarter turns on a torus without cones, where no loop turns at all: ask for turnings of 0, or for cones")]
+    #[error(
+        "loop {of} is to turn by {turning} quarter turns on a torus without cones, where no loop turns at all: ask for turnings of 0, or for cones"
+    )]
     FlatTorus {
         /// The loop.
         of: usize,
@@ -67,7 +73,10 @@ pub enum Infeasible {
         multiple_of: i64,
     },
     /// A half-translation surface of genus 2 with these cones does not exist.
-    #[error("no surface of genus 2 has cones of {} quarter turns alone where all loops turn by half turns (the strata Q(4) and Q(3,1) of quadratic differentials are empty; Masur, Smillie 1993): ask for other cones", list(cones))]
+    #[error(
+        "no surface of genus 2 has cones of {} quarter turns alone where all loops turn by half turns (the strata Q(4) and Q(3,1) of quadratic differentials are empty; Masur, Smillie 1993): ask for other cones",
+        list(cones)
+    )]
     EmptyStratum {
         /// Angles of the cones, quarter turns, ascending.
         cones: Vec<i64>,

@@ -89,7 +89,11 @@ fn way_from_donor(
             break;
         }
         if v != to && cone[v] > least {
-            let factor = if cone[v] > FULL_TURN { 1.0 } else { CONE_PREFERENCE };
+            let factor = if cone[v] > FULL_TURN {
+                1.0
+            } else {
+                CONE_PREFERENCE
+            };
             let cost = factor * distance;
             if best.is_none_or(|(least, _)| cost < least) {
                 best = Some((cost, v));

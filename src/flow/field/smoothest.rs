@@ -19,7 +19,7 @@ use std::f64::consts::FRAC_PI_2;
 const SHIFT: f64 = 1e-9;
 /// The iteration ends when a step lowers the energy by less than this part of it: where two fields are nearly as smooth,
 /// any mixture of both will do.
-const SETTLED: f64 = 1e-3;
+const SETTLED: f64 = 1e-2;
 /// Most steps.
 const MOST_STEPS: usize = 40;
 
@@ -65,7 +65,7 @@ fn least_eigenvector(
     let mut diagonal = vec![SHIFT; 2 * faces];
     let (mut pairs, mut values) = (Vec::new(), Vec::new());
     for f in c.faces() {
-        // Tells the ordering that the two parts of a face belong together.
+        // The blocks on the diagonal are diagonal, but filled soon.
         pairs.push(parts(f));
         values.push(0.0);
     }
@@ -87,7 +87,7 @@ fn least_eigenvector(
         pairs.extend([[u, x], [u, y], [v, x], [v, y]]);
         values.extend([-cosine, sine, -sine, -cosine]);
     }
-    let mut solver = SymmetricSolver::new(2 * faces, &pairs)?;
+    let mut solver = SymmetricSolver::with_blocks(2 * faces, 2, &pairs)?;
     solver.factorize(&diagonal, &values)?;
     let total: f64 = area.iter().sum();
     let mass = |part: usize| area[FaceId::new(part / 2)] * faces as f64 / total;

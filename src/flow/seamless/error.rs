@@ -16,7 +16,9 @@ pub enum SeamlessError {
         needed: usize,
     },
     /// The surface has a boundary.
-    #[error("seamless metrics are made on closed surfaces only: this one has {boundary_loops} boundary loops")]
+    #[error(
+        "seamless metrics are made on closed surfaces only: this one has {boundary_loops} boundary loops"
+    )]
     NotClosed {
         /// Number of boundary loops.
         boundary_loops: usize,
@@ -33,7 +35,9 @@ pub enum SeamlessError {
     #[error(transparent)]
     Infeasible(#[from] Infeasible),
     /// Newton's steps became ever shorter, or too many.
-    #[error("no seamless metric was found: after {iterations} steps the largest error of a cone angle or a turning is {max_error:.3e} rad (bound {tolerance:.1e}), and {step:.1e} of a step was taken last; cones that are far from where the surface bends, or turnings far from its own, may have no metric: let the field choose them, or ask for other ones")]
+    #[error(
+        "no seamless metric was found: after {iterations} steps the largest error of a cone angle or a turning is {max_error:.3e} rad (bound {tolerance:.1e}), and {step:.1e} of a step was taken last; cones that are far from where the surface bends, or turnings far from its own, may have no metric: let the field choose them, or ask for other ones"
+    )]
     Stalled {
         /// Steps taken.
         iterations: usize,
@@ -45,7 +49,9 @@ pub enum SeamlessError {
         step: f64,
     },
     /// The angles are met, but in float64 some faces are no triangles.
-    #[error("the seamless metric has {faces} faces that are no triangles in float64's 16 digits: remove vertices that nearly coincide and faces without width from the mesh")]
+    #[error(
+        "the seamless metric has {faces} faces that are no triangles in float64's 16 digits: remove vertices that nearly coincide and faces without width from the mesh"
+    )]
     BrokenFaces {
         /// How many.
         faces: usize,

@@ -216,7 +216,10 @@ impl FlippedRows {
                     }
                 }
             }
-            let row = collector.rows.drain(..).map(|r| (r, collector.sum[r as usize]));
+            let row = collector
+                .rows
+                .drain(..)
+                .map(|r| (r, collector.sum[r as usize]));
             let row: Vec<(u32, f64)> = row.collect();
             match rows.number[flip.edge] {
                 NONE => {

@@ -3,7 +3,8 @@
 //! A step is taken where it halves the norm of what is missing, or lowers it and is still on the near side of the line's zero. The first alone
 //! would refuse the long way down, the second alone halves every step near the end, where rounding decides the sign.
 //!
-//! After the tolerance is met, the last factor serves for steps that each at least halve the error: they cost no factorisation.
+//! Where a full step leaves a tenth of the error, its factor serves for further steps as long as each leaves a tenth again: they cost a fraction of
+//! one with a factor of its own. The same after the tolerance is met, as long as each halves the error.
 
 use super::norm::Norm;
 use super::normal::Normal;
@@ -18,10 +19,22 @@ const LARGEST_RANGE: f64 = 2.5;
 const SMALLEST_STEP: f64 = 1e-8;
 /// Part of the square of what is missing that a step may leave and is taken whatever lies beyond.
 const GOOD_SHARE: f64 = 0.25;
-/// Most steps after the tolerance is met.
-const POLISHING_STEPS: usize = 3;
+/// Part of the error that a step with an old factor may leave.
+const FAST_SHARE: f64 = 0.1;
+/// The same after the tolerance is met, where rounding sets in.
+const POLISHING_SHARE: f64 = 0.5;
 /// Error below which no further step is tried, radians.
 const SETTLED: f64 = 1e-13;
+
+/// When a factor serves for further steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Reuse {
+    /// Where they are nearly as good as Newton's.
+    WhereFast,
+    /// Only when the tolerance is met: Newton's method as the textbooks have it.
+    #[cfg(test)]
+    AtTheEnd,
+}
 
 /// Where Newton's method ended.
 pub(super) struct Solution {
@@ -34,6 +47,7 @@ pub(super) fn solve(
     problem: &Problem,
     start: EdgeVec<f64>,
     norm: &Norm,
+    reuse: Reuse,
     params: &SeamlessParams,
     observer: &dyn Observer,
 ) -> Result<Solution, SeamlessError> {
@@ -61,29 +75,34 @@ pub(super) fn solve(
         else {
             return Err(stalled(record.iteration, state.max_error, 0.0));
         };
+        let is_fast = step == 1.0 && found.max_error <= FAST_SHARE * state.max_error;
         (penner, state) = (next, found);
         record.iteration += 1;
         record.step = step;
+        if reuse == Reuse::WhereFast && is_fast {
+            let goal = params.tolerance;
+            refine(
+                problem,
+                &mut normal,
+                norm,
+                [goal, FAST_SHARE],
+                &mut penner,
+                &mut state,
+            );
+        }
+        if state.max_error <= params.tolerance {
+            let goal = SETTLED;
+            refine(
+                problem,
+                &mut normal,
+                norm,
+                [goal, POLISHING_SHARE],
+                &mut penner,
+                &mut state,
+            );
+        }
         history.push(record.at(&state));
         last = Some(normal);
-    }
-    if let Some(normal) = &mut last {
-        for _ in 0..POLISHING_STEPS {
-            if state.max_error <= SETTLED {
-                break;
-            }
-            let (direction, _) = normal.direction(problem, norm, &state.missing);
-            let next = moved(&penner, &direction, 1.0);
-            let found = problem.evaluate(&next);
-            let is_better = found.max_error <= 0.5 * state.max_error;
-            if !is_better {
-                break;
-            }
-            (penner, state) = (next, found);
-            if let Some(line) = history.last_mut() {
-                *line = record.at(&state);
-            }
-        }
     }
     let broken = state.shape.iter().filter(|s| s.broken).count();
     match broken {
@@ -93,6 +112,27 @@ pub(super) fn solve(
             history,
         }),
         faces => Err(SeamlessError::BrokenFaces { faces }),
+    }
+}
+
+/// Full steps with an old factor, until the error is at most `goal` or one leaves more than `share` of it.
+fn refine(
+    problem: &Problem,
+    normal: &mut Normal,
+    norm: &Norm,
+    [goal, share]: [f64; 2],
+    penner: &mut EdgeVec<f64>,
+    state: &mut State,
+) {
+    while state.max_error > goal {
+        let (direction, _) = normal.direction(problem, norm, &state.missing);
+        let next = moved(penner, &direction, 1.0);
+        let found = problem.evaluate(&next);
+        let is_better = found.max_error <= share * state.max_error;
+        if !is_better {
+            break;
+        }
+        (*penner, *state) = (next, found);
     }
 }
 

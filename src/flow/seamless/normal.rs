@@ -57,15 +57,19 @@ impl Normal {
             mut diagonal,
             ..
         } = products;
+        // An order that is kept although edges were flipped lets the factor fill up: twice over for one edge in a hundred.
         let mut solver = match last {
             Some(last) if last.pairs == pairs => last.solver,
-            _ => SymmetricSolver::with_border(equations, loops, &pairs)?,
+            Some(last) => last.solver.renewed(loops, &pairs)?,
+            None => SymmetricSolver::with_border(equations, loops, &pairs)?,
         };
         let mean = diagonal.iter().sum::<f64>() / equations.max(1) as f64;
         let mut shifted = 0.0;
         let mut result = Ok(());
         for shift in SHIFTS {
-            diagonal.iter_mut().for_each(|d| *d += (shift - shifted) * mean);
+            diagonal
+                .iter_mut()
+                .for_each(|d| *d += (shift - shifted) * mean);
             shifted = shift;
             result = solver.factorize(&diagonal, &values);
             if result.is_ok() {
@@ -146,7 +150,8 @@ impl Products {
     fn list_loops(&mut self) {
         for i in 0..self.loops {
             for j in 0..i {
-                self.pairs.push([(self.cones + j) as u32, (self.cones + i) as u32]);
+                self.pairs
+                    .push([(self.cones + j) as u32, (self.cones + i) as u32]);
                 self.values.push(self.among_loops[i * self.loops + j]);
             }
         }

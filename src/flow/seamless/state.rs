@@ -40,16 +40,20 @@ pub(super) struct State {
 }
 
 impl<'a> Problem<'a> {
-    pub(super) fn new(
-        base: &'a Connectivity,
-        loops: &'a DualLoops,
-        signature: &Signature,
-    ) -> Self {
+    pub(super) fn new(base: &'a Connectivity, loops: &'a DualLoops, signature: &Signature) -> Self {
         Self {
             base,
             loops,
-            theta: signature.cone.iter().map(|&k| k as f64 * FRAC_PI_2).collect(),
-            turning: signature.turning.iter().map(|&k| k as f64 * FRAC_PI_2).collect(),
+            theta: signature
+                .cone
+                .iter()
+                .map(|&k| k as f64 * FRAC_PI_2)
+                .collect(),
+            turning: signature
+                .turning
+                .iter()
+                .map(|&k| k as f64 * FRAC_PI_2)
+                .collect(),
         }
     }
 
@@ -86,10 +90,14 @@ impl<'a> Problem<'a> {
         }
         let turning = loops.turning(&c, |corner| shape[c.face(corner)].angle[c.corner(corner)]);
         let turning = self.turning.iter().zip(turning).map(|(to, now)| to - now);
-        let first = theta[VertexId::new(0)];
-        let missing: Vec<f64> = theta.iter().skip(1).copied().chain(turning).collect();
-        let largest = missing.iter().fold(first.abs(), |m, x| m.max(x.abs()));
-        let is_finite = first.is_finite() && missing.iter().all(|x| x.is_finite());
+        let turning: Vec<f64> = turning.collect();
+        let angles = theta.iter().copied().chain(turning.iter().copied());
+        let largest = angles.clone().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let is_finite = angles.fold(true, |all, x| all && x.is_finite());
+        // Zero but for π in float64 being too small, which comes to 1e-11 on 50,000 vertices and must not gather at the first.
+        let mean = theta.iter().sum::<f64>() / theta.len().max(1) as f64;
+        let cones = theta.iter().skip(1).map(|x| x - mean);
+        let missing = cones.chain(turning.iter().copied()).collect();
         State {
             log_length,
             shape,
