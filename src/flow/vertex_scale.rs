@@ -134,8 +134,7 @@ mod tests {
             let of_face = |f| {
                 let (v, e) = (c.face_vertices(f), c.face_edges(f));
                 let d = e.map(|e| change[e]);
-                let corner: [f64; 3] =
-                    [0, 1, 2].map(|k| d[(k + 1) % 3] + d[(k + 2) % 3] - d[k]);
+                let corner: [f64; 3] = [0, 1, 2].map(|k| d[(k + 1) % 3] + d[(k + 2) % 3] - d[k]);
                 let gap = |i: usize, j: usize| (u[v[i]] - u[v[j]]) - (corner[i] - corner[j]);
                 gap(0, 1).powi(2) + gap(1, 2).powi(2) + gap(2, 0).powi(2)
             };

@@ -2,8 +2,8 @@
 
 use crate::flow::field::FieldError;
 use crate::flow::holonomy::HolonomyError;
-use crate::geometry::connectivity::ConnectivityError;
 use crate::flow::pi_multiple::in_pi;
+use crate::geometry::connectivity::ConnectivityError;
 
 /// Why there is no target curvature; vertices are those of the input file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

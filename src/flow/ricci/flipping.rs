@@ -121,8 +121,8 @@ mod tests {
     use super::super::shapes::{self, Shape};
     use super::super::{Scheme, Solver, flow as run};
     use super::*;
-    use crate::flow::doubled::Doubled;
     use crate::flow::cones::{BoundaryCondition, Prescription};
+    use crate::flow::doubled::Doubled;
     use crate::geometry::ids::VertexId;
     use std::f64::consts::PI;
 

@@ -51,7 +51,10 @@ pub(super) fn flow(
             let target = prescription.target.clone();
             let conformal = flipping::flow(surface, target, prescribed, params, observer)?;
             let turning = turning_at(&ground, &conformal.log_scale, &loops);
-            turning.iter().map(|t| (t / FRAC_PI_2).round() as i64).collect()
+            turning
+                .iter()
+                .map(|t| (t / FRAC_PI_2).round() as i64)
+                .collect()
         }
     };
     let signature = Signature { cone, turning };
@@ -67,27 +70,45 @@ pub(super) fn flow(
         },
         observer,
     )?;
-    let log_length: EdgeVec<f64> = found.penner.iter().map(|l| 0.5 * l).collect();
+    let log_length = found.penner.iter().map(|l| 0.5 * l).collect();
+    let history = found.history.iter().map(line).collect();
+    let metric = with_lengths(ground, log_length)?;
+    Ok(FlatMetric {
+        history,
+        max_curvature_error: found.max_error,
+        ..metric
+    })
+}
+
+/// The metric that B has with other lengths (natural logarithms, Penner coordinates), whose Delaunay triangulation must be flat but for cones; for closed
+/// surfaces. The record of how it was found is empty.
+pub(crate) fn with_lengths(
+    ground: SurfaceDelaunay,
+    log_length: EdgeVec<f64>,
+) -> Result<FlatMetric, FlowError> {
     let parts = log_length.iter().zip(ground.log_length.iter());
     let change: EdgeVec<f64> = parts.map(|(to, from)| to - from).collect();
     let u = nearest_scale(&ground.delaunay, &change)?;
     let delaunay_penner = at_unit_scale(&ground.delaunay, &log_length, &u);
     let (flat, shape) = flipped(&ground, log_length);
+    let c = &flat.connectivity;
     let mut curvature = VertexVec::filled(TAU, c.vertex_count());
     for (f, shape) in shape.enumerate() {
-        let corners = flat.connectivity.face_vertices(f).into_iter();
-        corners.zip(shape.angle).for_each(|(v, angle)| curvature[v] -= angle);
+        let corners = c.face_vertices(f).into_iter().zip(shape.angle);
+        corners.for_each(|(v, angle)| curvature[v] -= angle);
     }
-    let penner = at_unit_scale(&flat.connectivity, &flat.log_lengths(), &u);
+    let log_length = flat.log_lengths();
+    let penner = at_unit_scale(c, &log_length, &u);
+    let front_faces = ground.base.face_count();
     Ok(FlatMetric {
         log_scale: u.clone(),
-        length: flat.log_lengths().iter().map(|l| l.exp()).collect(),
+        length: log_length.iter().map(|l| l.exp()).collect(),
         curvature,
-        history: found.history.iter().map(line).collect(),
-        max_curvature_error: found.max_error,
+        history: Vec::new(),
+        max_curvature_error: 0.0,
         fit: None,
         intrinsic: Some(Box::new(ground.leave(
-            c.face_count(),
+            front_faces,
             flat,
             penner,
             u,
@@ -142,5 +163,115 @@ fn line(step: &SeamlessStep) -> FlowStep {
         step: step.step,
         flips: step.flips,
         flow_time: step.iteration as f64,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Holonomy, flow as run, shapes};
+    use super::*;
+    use std::f64::consts::PI;
+
+    fn params(holonomy: Holonomy) -> FlowParams {
+        FlowParams {
+            holonomy,
+            ..FlowParams::default()
+        }
+    }
+
+    /// Where lengths change by a scale, everything is as the conformal flow leaves it.
+    #[test]
+    fn a_conformal_change_is_that_of_the_conformal_flow() {
+        for shape in [
+            shapes::plate(0, 2),
+            shapes::torus(9, 7),
+            shapes::plate(2, 2),
+        ] {
+            let (c, length) = (&shape.connectivity, &shape.length);
+            let prescription = shape.prescribe_default();
+            let expected = run(c, length, &prescription, &params(Holonomy::Free), &()).unwrap();
+            let x = expected.intrinsic.as_ref().unwrap();
+            let ground = SurfaceDelaunay::new(c, length).unwrap();
+            let scaled = |(e, l): (_, &f64)| {
+                let [i, j] = x.delaunay.edge_vertices(e);
+                l + 0.5 * (x.u[i] + x.u[j])
+            };
+            let log_length = ground.log_length.enumerate().map(scaled).collect();
+            let found = with_lengths(ground, log_length).unwrap();
+            let y = found.intrinsic.as_ref().unwrap();
+            let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} against {b}");
+            x.u.iter().zip(y.u.iter()).for_each(|(a, b)| close(*a, *b));
+            let unit = y.delaunay_penner.as_ref().unwrap();
+            x.delaunay_length
+                .iter()
+                .zip(unit.iter())
+                .for_each(|(a, b)| close(a.ln(), *b));
+            expected
+                .curvature
+                .iter()
+                .zip(found.curvature.iter())
+                .for_each(|(a, b)| {
+                    assert!((a - b).abs() < 1e-9, "{a} against {b}");
+                });
+        }
+    }
+
+    /// Cones that are given, on a surface with handles: the loops turn by quarters too, and hardly anything else changes.
+    #[test]
+    fn loops_turn_by_the_nearest_quarters() {
+        let shape = shapes::plate(2, 2);
+        let (c, length) = (&shape.connectivity, &shape.length);
+        let count = 8;
+        let places = shape.spread(count);
+        let cones: Vec<(usize, f64)> = places.iter().map(|&v| (v, -0.5 * PI)).collect();
+        let prescription = shape.prescribe(&cones);
+        let conformal = run(c, length, &prescription, &params(Holonomy::Free), &()).unwrap();
+        let found = run(
+            c,
+            length,
+            &prescription,
+            &params(Holonomy::QuarterTurns),
+            &(),
+        )
+        .unwrap();
+        assert!(found.max_curvature_error <= 1e-10);
+        let loops = homology_basis(&found.intrinsic.as_ref().unwrap().delaunay).unwrap();
+        let ground = SurfaceDelaunay::new(c, length).unwrap();
+        let before = turning_at(&ground, &conformal.log_scale, &loops);
+        let off = |t: &f64| (t / FRAC_PI_2 - (t / FRAC_PI_2).round()).abs();
+        assert!(
+            before.iter().any(|t| off(t) > 1e-3),
+            "no loop is off: {before:?}"
+        );
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_in_words() {
+        let sphere = shapes::plate(0, 2);
+        let places = sphere.spread(3);
+        let cones: Vec<(usize, f64)> = places.iter().map(|&v| (v, 4.0 / 3.0 * PI)).collect();
+        let quarter_turns = params(Holonomy::QuarterTurns);
+        let refuse = |shape: &shapes::Shape, cones: &[(usize, f64)], params: &FlowParams| {
+            let (c, length) = (&shape.connectivity, &shape.length);
+            run(c, length, &shape.prescribe(cones), params, &())
+                .unwrap_err()
+                .to_string()
+        };
+        let said = refuse(&sphere, &cones, &quarter_turns);
+        assert!(
+            said.contains("4/3π") && said.contains("cones.quantum"),
+            "{said}"
+        );
+        let said = refuse(&shapes::sheet(5, false), &[], &quarter_turns);
+        assert!(said.contains("1 boundary loop:"), "{said}");
+        let gradient = FlowParams {
+            solver: super::super::Solver::Gradient,
+            ..quarter_turns
+        };
+        let said = refuse(&sphere, &cones, &gradient);
+        assert!(said.contains("flow.solver = \"gradient\""), "{said}");
+        let torus = shapes::torus(9, 7);
+        let said = refuse(&torus, &[(0, 0.5 * PI), (30, -0.5 * PI)], &quarter_turns);
+        assert!(said.contains("no torus has just two cones"), "{said}");
     }
 }
