@@ -398,6 +398,7 @@ mod tests {
             target,
             cones,
             boundary,
+            turning: None,
         };
         let layout = Layout::identity(c, &length);
         let cut = cut(c, &length, &prescription).unwrap();
@@ -527,6 +528,7 @@ mod tests {
             target: curvature(&mesh),
             cones: Vec::new(),
             boundary: BoundaryCondition::Free,
+            turning: None,
         };
         assert!(holonomy_error(&mesh, &cut, &charts, &prescription) > 0.9e-3);
         assert!(transition_residual(&charts, &cut, &central, &mesh) > 1e-4);

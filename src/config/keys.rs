@@ -223,7 +223,7 @@ pub const KEYS: &[Key] = &[
     ),
     key(
         "cones.strategy",
-        Kind::Choice(&["auto", "listed", "single", "spread", "none"]),
+        Kind::Choice(&["auto", "listed", "field", "single", "spread", "none"]),
         "",
         "\"auto\"",
     ),
@@ -381,6 +381,18 @@ pub const KEYS: &[Key] = &[
         "\"vertex-scaling\"",
     ),
     key("flow.delaunay", Kind::Bool, "", "true"),
+    key(
+        "flow.holonomy",
+        Kind::Choice(&["free", "quarter-turns"]),
+        "",
+        "\"free\"",
+    ),
+    key(
+        "flow.conformality",
+        Kind::Number { min: 0.0, max: 1e6 },
+        "",
+        "0.0",
+    ),
     key(
         "flow.solver",
         Kind::Choice(&["newton", "gradient"]),

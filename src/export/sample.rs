@@ -245,6 +245,7 @@ impl Grid {
                 target: VertexVec::filled(0.0, vertices),
                 cones: Vec::new(),
                 boundary: BoundaryCondition::Free,
+                turning: None,
             },
             flow: FlowParams::default(),
             metric: FlatMetric {

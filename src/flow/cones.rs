@@ -23,6 +23,7 @@
 mod auto;
 mod boundary;
 mod error;
+mod field;
 pub mod file;
 mod params;
 mod request;
@@ -64,7 +65,13 @@ pub fn prescribe(
     // By what name each vertex got its curvature.
     let mut named = VertexVec::filled(None, mesh.connectivity.vertex_count());
     let on_boundary = boundary::prescribed_total(&topology, requests, condition, boundary)?;
+    let mut turning = None;
     let chosen = match (cones.strategy, requests.cones.is_empty()) {
+        (ConeStrategy::Field, _) => {
+            let (chosen, turns) = field::select(mesh)?;
+            turning = Some(turns);
+            chosen
+        }
         (ConeStrategy::Auto | ConeStrategy::Listed, true) => {
             auto::select(mesh, &topology, requests, condition, cones, boundary)?
         }
@@ -111,7 +118,10 @@ pub fn prescribe(
         _ => GAUSS_BONNET_TOLERANCE,
     };
     check_total(mesh, &topology, condition, rounding, &mut target)?;
-    Ok(Prescription::new(target, condition))
+    Ok(Prescription {
+        turning,
+        ..Prescription::new(target, condition)
+    })
 }
 
 /// The cones that the user names or that a strategy other than the automatic choice yields.
@@ -126,7 +136,7 @@ fn choose(
     match params.strategy {
         // Where there are none, they are chosen automatically.
         ConeStrategy::Auto | ConeStrategy::Listed => Ok(requests.cones.clone()),
-        ConeStrategy::None => Ok(Vec::new()),
+        ConeStrategy::None | ConeStrategy::Field => Ok(Vec::new()),
         ConeStrategy::Spread => {
             let count = params.count.unwrap_or(DEFAULT_COUNT);
             if count == 0 {

@@ -50,10 +50,26 @@ pub struct Delaunay {
     scale: VertexVec<f64>,
     /// Told of every flip.
     pub correspondences: Vec<Correspondence>,
+    /// Every flip by Ptolemy's theorem, in order, for whoever needs its derivative; `None` where nobody does.
+    pub record: Option<Vec<PtolemyFlip>>,
     /// Flips so far.
     pub flips: usize,
     /// How often every edge was flipped at this `u`; all zero between evaluations.
     tired: EdgeVec<u8>,
+}
+
+/// A flip by Ptolemy's theorem, and how the new length depends on the old ones:
+/// d ln l_dc = −d ln l_ab + `share` (d ln l_ad + d ln l_bc) + (1 − `share`) (d ln l_ca + d ln l_db).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PtolemyFlip {
+    /// What happened to the halfedges.
+    pub flip: Flip,
+    /// The edge that was flipped: `ab` before, `dc` after.
+    pub edge: EdgeId,
+    /// The edges `ca`, `ad`, `db`, `bc`.
+    pub outer: [EdgeId; 4],
+    /// l_ad l_bc as a share of l_ad l_bc + l_ca l_db.
+    pub share: f64,
 }
 
 /// How a flip finds the length of the new diagonal.
@@ -72,13 +88,24 @@ impl Delaunay {
         length: &EdgeVec<f64>,
         correspondences: Vec<Correspondence>,
     ) -> Self {
+        let log_length = length.iter().map(|l| l.ln()).collect();
+        Self::from_logs(connectivity, log_length, correspondences)
+    }
+
+    /// The same with the logarithms of the lengths.
+    pub fn from_logs(
+        connectivity: Connectivity,
+        log_length: EdgeVec<f64>,
+        correspondences: Vec<Correspondence>,
+    ) -> Self {
         Self {
-            high: length.iter().map(|l| l.ln()).collect(),
+            high: log_length,
             low: EdgeVec::filled(0.0, connectivity.edge_count()),
             scale: VertexVec::filled(0.0, connectivity.vertex_count()),
             tired: EdgeVec::filled(0, connectivity.edge_count()),
             connectivity,
             correspondences,
+            record: None,
             flips: 0,
         }
     }
@@ -180,6 +207,16 @@ impl Delaunay {
             (self.high[e], self.low[e]) = (length, 0.0);
             for correspondence in &mut self.correspondences {
                 correspondence.flipped(&self.connectivity, &flip);
+            }
+            if let Some(record) = &mut self.record {
+                let outer = flip.moves.map(|(_, to)| self.connectivity.edge(to));
+                let [ca, ad, db, bc] = outer.map(|e| self.high[e] + self.low[e]);
+                record.push(PtolemyFlip {
+                    flip,
+                    edge: e,
+                    outer,
+                    share: 1.0 / (1.0 + ((ca + db) - (ad + bc)).exp()),
+                });
             }
             self.flips += 1;
             self.tired[e] = self.tired[e].saturating_add(1);
@@ -320,45 +357,15 @@ mod tests {
     use crate::flow::ricci::shapes;
     use crate::geometry::ids::VertexId;
 
-    /// Faces glued along equal letters; a capital runs the other way. All corners are glued as they must be.
-    fn glued(words: &[&str]) -> Connectivity {
-        let sides: Vec<char> = words.iter().flat_map(|w| w.chars()).collect();
-        let twin: Vec<Option<HalfedgeId>> = sides
-            .iter()
-            .enumerate()
-            .map(|(h, s)| {
-                let other = |o: char| o != *s && o.eq_ignore_ascii_case(s);
-                let t = (0..sides.len()).find(|&t| t != h && other(sides[t]));
-                t.map(HalfedgeId::new)
-            })
-            .collect();
-        // Corners around a vertex by walking.
-        let mut tail = vec![usize::MAX; sides.len()];
-        let mut vertices = 0;
-        for start in 0..sides.len() {
-            let mut h = start;
-            while tail[h] == usize::MAX {
-                tail[h] = vertices;
-                let prev = h - h % 3 + (h % 3 + 2) % 3;
-                h = twin[prev].unwrap().index();
-            }
-            if tail[start] == vertices {
-                vertices += 1;
-            }
-        }
-        let tail: Vec<VertexId> = tail.into_iter().map(VertexId::new).collect();
-        Connectivity::from_gluing(tail.into(), &twin, vertices).unwrap()
-    }
-
     /// One-vertex torus, double of a triangle, a pillow of two self-glued faces (degree-1 vertices), one-vertex genus 2.
     fn tiny() -> Vec<(&'static str, Connectivity)> {
         vec![
-            ("one-vertex torus", glued(&["abc", "ABC"])),
-            ("double of a triangle", glued(&["abc", "CBA"])),
-            ("two-triangle sphere", glued(&["aAb", "BcC"])),
+            ("one-vertex torus", shapes::glued(&["abc", "ABC"])),
+            ("double of a triangle", shapes::glued(&["abc", "CBA"])),
+            ("two-triangle sphere", shapes::glued(&["aAb", "BcC"])),
             (
                 "one-vertex genus 2",
-                glued(&["abx", "XAy", "YBz", "ZcW", "wdv", "VCD"]),
+                shapes::glued(&["abx", "XAy", "YBz", "ZcW", "wdv", "VCD"]),
             ),
         ]
     }

@@ -22,12 +22,16 @@ pub struct Intrinsic {
     pub delaunay: Connectivity,
     /// Length of every edge of B, source units.
     pub delaunay_length: EdgeVec<f64>,
+    /// ln of the length that every edge of B has at u = 0, where that is not `delaunay_length`: what is left of a change of metric
+    /// that was not conformal once u is taken out of it.
+    pub delaunay_penner: Option<EdgeVec<f64>>,
     /// C, reached from B by Ptolemy flips.
     pub flat: Connectivity,
     /// ln of the length that every edge of C has at u = 0 (a Penner coordinate; Ptolemy's theorem, not a distance on
     /// the source surface). The flat length of the edge ij is e^{penner + (u_i + u_j) / 2}.
     pub penner: EdgeVec<f64>,
-    /// Logarithm of the scale, one a vertex of A.
+    /// Logarithm of the scale, one a vertex of A; where the change was not conformal, the nearest to it
+    /// ([`nearest_scale`](crate::flow::vertex_scale::nearest_scale)).
     pub u: VertexVec<f64>,
     /// Edges of A on B.
     pub base_on_delaunay: Correspondence,

@@ -42,6 +42,9 @@ pub struct Prescription {
     pub cones: Vec<Cone>,
     /// What happens on the boundary. `Free` on closed surfaces, where it says nothing.
     pub boundary: BoundaryCondition,
+    /// By how many quarter turns every loop of [`homology_basis`](crate::flow::holonomy::homology_basis) on the surface's own Delaunay triangulation shall
+    /// turn, for flows to quarter turns; `None` leaves that to the flow.
+    pub turning: Option<Vec<i64>>,
 }
 
 impl Prescription {
@@ -56,6 +59,7 @@ impl Prescription {
             target,
             cones,
             boundary,
+            turning: None,
         }
     }
 }

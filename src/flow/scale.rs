@@ -1,6 +1,7 @@
 //! Log scales as one vector: a number `u` for every vertex.
 
-use crate::geometry::ids::VertexVec;
+use crate::geometry::connectivity::Connectivity;
+use crate::geometry::ids::{EdgeVec, VertexVec};
 
 /// Dot product in the order of vertices.
 pub(crate) fn dot(a: &VertexVec<f64>, b: &VertexVec<f64>) -> f64 {
@@ -28,4 +29,17 @@ pub(crate) fn spread(values: &VertexVec<f64>) -> f64 {
         (low, high) = (low.min(x), high.max(x));
     }
     high - low
+}
+
+/// Logarithms of lengths with the scale taken out: λ_ij − (u_i + u_j)/2.
+pub(crate) fn at_unit_scale(
+    c: &Connectivity,
+    log_length: &EdgeVec<f64>,
+    u: &VertexVec<f64>,
+) -> EdgeVec<f64> {
+    let without = |(e, l): (_, &f64)| {
+        let [i, j] = c.edge_vertices(e);
+        l - 0.5 * (u[i] + u[j])
+    };
+    log_length.enumerate().map(without).collect()
 }

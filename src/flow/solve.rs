@@ -18,11 +18,11 @@ use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::solvers::Solve;
 use faer::perm::PermRef;
-use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
+use faer::sparse::linalg::{SupernodalThreshold, amd};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Accum, Conj, MatMut, MatRef, Par, Side, Spec};
 
@@ -104,19 +104,46 @@ impl SymmetricSolver {
     /// off-diagonal entries `pairs`, each named once for both triangles. A pair may occur several times (its
     /// values are added); a pair of equal indices adds to the diagonal.
     pub fn new(size: usize, pairs: &[[u32; 2]]) -> Result<Self, SolveError> {
-        Self::ordered(size, pairs, None)
+        Self::ordered(size, pairs, Order::LeastDegree { border: 0 })
+    }
+
+    /// The same for a matrix whose last `border` unknowns are coupled with very many others each: they are eliminated last, and the others
+    /// are ordered as if there were none.
+    pub fn with_border(size: usize, border: usize, pairs: &[[u32; 2]]) -> Result<Self, SolveError> {
+        Self::ordered(size, pairs, Order::LeastDegree { border })
+    }
+
+    /// The same for a matrix of `width` × `width` blocks that are all zero or all given: whole blocks are ordered, which is quicker.
+    pub fn with_blocks(size: usize, width: usize, pairs: &[[u32; 2]]) -> Result<Self, SolveError> {
+        Self::ordered(size, pairs, Order::Blocks { width })
     }
 
     /// The same for a pattern that differs little from this one: the order is kept, which saves most of the
     /// analysis. Where much has changed the factor fills up many times over: then order anew.
     pub fn with_pairs(&self, pairs: &[[u32; 2]]) -> Result<Self, SolveError> {
-        Self::ordered(self.size, pairs, self.symbolic.perm())
+        let order = self.symbolic.perm().map(Order::Given);
+        Self::ordered(
+            self.size,
+            pairs,
+            order.unwrap_or(Order::LeastDegree { border: 0 }),
+        )
     }
 
-    fn ordered(
+    /// [`with_border`](Self::with_border) for another pattern of as many unknowns, in the memory of this one.
+    pub fn renewed(self, border: usize, pairs: &[[u32; 2]]) -> Result<Self, SolveError> {
+        Self::with_memory(self.size, pairs, Order::LeastDegree { border }, self.factor)
+    }
+
+    fn ordered(size: usize, pairs: &[[u32; 2]], order: Order<'_>) -> Result<Self, SolveError> {
+        Self::with_memory(size, pairs, order, Vec::new())
+    }
+
+    /// `factor`: memory to be used again.
+    fn with_memory(
         size: usize,
         pairs: &[[u32; 2]],
-        order: Option<PermRef<'_, u32>>,
+        order: Order<'_>,
+        mut factor: Vec<f64>,
     ) -> Result<Self, SolveError> {
         let too_large = SolveError::TooLarge { unknowns: size };
         if size >= u32::MAX as usize / 2 || pairs.len() >= u32::MAX as usize / 2 {
@@ -158,7 +185,19 @@ impl SymmetricSolver {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
         };
-        let ordering = order.map_or(SymmetricOrdering::Amd, SymmetricOrdering::Custom);
+        let own;
+        let ordering = match order {
+            Order::Given(order) => SymmetricOrdering::Custom(order),
+            Order::LeastDegree { border: 0 } => SymmetricOrdering::Amd,
+            Order::LeastDegree { border } => {
+                own = border_last(size, border, &column, &row).ok_or(too_large)?;
+                SymmetricOrdering::Custom(PermRef::new_checked(&own.0, &own.1, size))
+            }
+            Order::Blocks { width } => {
+                own = by_blocks(size, width, &column, &row).ok_or(too_large)?;
+                SymmetricOrdering::Custom(PermRef::new_checked(&own.0, &own.1, size))
+            }
+        };
         let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, ordering, params)
             .map_err(|_| too_large)?;
         let scratch = StackReq::or(
@@ -166,13 +205,14 @@ impl SymmetricSolver {
             symbolic.solve_in_place_scratch::<f64>(BLOCK, Par::Seq),
         );
         let workspace = MemBuffer::try_new(scratch).map_err(|_| too_large)?;
+        factor.resize(symbolic.len_val(), 0.0);
         Ok(Self {
             size,
             value: vec![0.0; row.len()],
             column,
             row,
             slot,
-            factor: vec![0.0; symbolic.len_val()],
+            factor,
             symbolic,
             workspace,
         })
@@ -244,6 +284,84 @@ impl SymmetricSolver {
             );
         }
     }
+}
+
+/// In which order unknowns are eliminated.
+enum Order<'a> {
+    /// Approximate minimum degree, but for the last `border` unknowns, which come last.
+    LeastDegree {
+        border: usize,
+    },
+    /// Approximate minimum degree of blocks of `width` unknowns.
+    Blocks {
+        width: usize,
+    },
+    Given(PermRef<'a, u32>),
+}
+
+/// A permutation and its inverse.
+type Permutation = (Vec<u32>, Vec<u32>);
+
+/// Approximate minimum degree of the leading block, then the last `border` unknowns. `column` and `row` are the lower triangle by columns,
+/// ascending. `None` where memory does not suffice.
+fn border_last(size: usize, border: usize, column: &[u32], row: &[u32]) -> Option<Permutation> {
+    let core = size.saturating_sub(border);
+    let mut first = Vec::with_capacity(core + 1);
+    let mut inner = Vec::with_capacity(row.len());
+    for c in 0..core {
+        first.push(inner.len() as u32);
+        let rows = &row[column[c] as usize..column[c + 1] as usize];
+        inner.extend(rows.iter().copied().filter(|&r| (r as usize) < core));
+    }
+    first.push(inner.len() as u32);
+    let (mut order, mut place) = least_degree(&first, &inner)?;
+    order.extend(core as u32..size as u32);
+    place.extend(core as u32..size as u32);
+    Some((order, place))
+}
+
+/// Approximate minimum degree of blocks, and the unknowns of a block one after another.
+fn by_blocks(size: usize, width: usize, column: &[u32], row: &[u32]) -> Option<Permutation> {
+    let (blocks, width) = (size / width, width as u32);
+    let mut first = Vec::with_capacity(blocks + 1);
+    let mut inner: Vec<u32> = Vec::with_capacity(row.len() / width as usize);
+    for b in 0..blocks {
+        let begin = inner.len();
+        first.push(begin as u32);
+        let c = b * width as usize;
+        for r in &row[column[c] as usize..column[c + 1] as usize] {
+            if inner[begin..].last() != Some(&(r / width)) {
+                inner.push(r / width);
+            }
+        }
+    }
+    first.push(inner.len() as u32);
+    let (order, place) = least_degree(&first, &inner)?;
+    let unknowns = |blocks: Vec<u32>| {
+        let each = blocks
+            .into_iter()
+            .flat_map(|b| (0..width).map(move |k| width * b + k));
+        each.collect()
+    };
+    Some((unknowns(order), unknowns(place)))
+}
+
+/// Approximate minimum degree of a lower triangle by columns.
+fn least_degree(first: &[u32], row: &[u32]) -> Option<Permutation> {
+    let size = first.len() - 1;
+    let pattern = SymbolicSparseColMatRef::new_checked(size, size, first, None, row);
+    let (mut order, mut place) = (vec![0; size], vec![0; size]);
+    let scratch = amd::order_scratch::<u32>(size, row.len());
+    let mut memory = MemBuffer::try_new(scratch).ok()?;
+    amd::order(
+        &mut order,
+        &mut place,
+        pattern,
+        amd::Control::default(),
+        MemStack::new(&mut memory),
+    )
+    .ok()?;
+    Some((order, place))
 }
 
 #[cfg(test)]
@@ -321,7 +439,8 @@ mod tests {
                 let expected = dense_solve(dense.clone(), rhs.clone());
                 // With its own order, and with that of itself, which must come to the same.
                 let mut kept = solver.with_pairs(&pairs).unwrap();
-                for solver in [&mut solver, &mut kept] {
+                let mut last = SymmetricSolver::with_border(n, n.div_ceil(3), &pairs).unwrap();
+                for solver in [&mut solver, &mut kept, &mut last] {
                     solver.factorize(&diagonal, &off).unwrap();
                     let mut x = rhs.clone();
                     solver.solve(&mut x);
@@ -330,6 +449,38 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn blocks_are_ordered_as_a_whole() {
+        let mut random = sequence(11);
+        let (blocks, width) = (30, 2);
+        let mut pairs = Vec::new();
+        for b in 0..blocks as u32 {
+            pairs.push([2 * b, 2 * b + 1]);
+            let other = (random() * blocks as f64) as u32;
+            if other != b {
+                let (x, y) = (2 * b, 2 * other);
+                pairs.extend([[x, y], [x, y + 1], [x + 1, y], [x + 1, y + 1]]);
+            }
+        }
+        let size = width * blocks;
+        let off: Vec<f64> = pairs.iter().map(|_| random() - 0.5).collect();
+        let (diagonal, rhs) = (vec![40.0; size], (0..size).map(|_| random()));
+        let rhs: Vec<f64> = rhs.collect();
+        let solutions = [
+            SymmetricSolver::new(size, &pairs),
+            SymmetricSolver::with_blocks(size, width, &pairs),
+        ];
+        let [one, other] = solutions.map(|solver| {
+            let (mut solver, mut x) = (solver.unwrap(), rhs.clone());
+            solver.factorize(&diagonal, &off).unwrap();
+            solver.solve(&mut x);
+            x
+        });
+        for (a, b) in one.iter().zip(&other) {
+            assert!((a - b).abs() < 1e-14);
         }
     }
 

@@ -2,7 +2,9 @@
 
 use crate::common::Triangles;
 use crate::models;
-use affine_atlas::flow::cones::{BoundaryCondition, ConeParams};
+use affine_atlas::flow::cones::{BoundaryCondition, ConeParams, ConeStrategy};
+use affine_atlas::flow::ricci::{self, FlowParams, Holonomy};
+use affine_atlas::geometry::ids::EdgeVec;
 use std::collections::HashMap;
 use std::f64::consts::PI;
 
@@ -92,5 +94,31 @@ pub fn by_default(genus: usize, is_open: bool) -> Result<(), String> {
     match distortion.cost < MOST_J {
         true => Ok(()),
         false => Err(format!("{} cones leave {distortion:?}", chosen.len())),
+    }
+}
+
+/// Cones of a cross field and quarter turns along all 2g loops, on the closed plate.
+pub fn quarter_turns(genus: usize) -> Result<(), String> {
+    let mesh = models::mesh(&plate(genus, false));
+    let cones = ConeParams {
+        strategy: ConeStrategy::Field,
+        ..ConeParams::default()
+    };
+    let (given, chosen) = models::choose(&mesh, &cones, BoundaryCondition::Free)?;
+    let params = FlowParams {
+        holonomy: Holonomy::QuarterTurns,
+        ..FlowParams::default()
+    };
+    let c = &mesh.connectivity;
+    let length: EdgeVec<f64> = c.edges().map(|e| mesh.edge_length(e)).collect();
+    let metric = ricci::flow(c, &length, &given, &params, &()).map_err(|e| e.to_string())?;
+    let (error, steps) = (metric.max_curvature_error, metric.history.len() - 1);
+    println!(
+        "genus {genus}: {} cones, {steps} steps, error {error:.1e}",
+        chosen.len()
+    );
+    match error <= 1e-10 && steps <= 15 {
+        true => Ok(()),
+        false => Err(format!("error {error:e} after {steps} steps")),
     }
 }

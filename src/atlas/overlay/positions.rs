@@ -8,7 +8,9 @@
 //! does not have, the places are those before it was removed.
 //!
 //! How: edges of A are straight in the metric of B (`straight`), edges of C are hyperbolic geodesics (`geodesic`); both are straight
-//! segments inside the faces of B, so that each base edge gets a list of drawn crossings (`words`, `chords`). Drawn curves need
+//! segments inside the faces of B, so that each base edge gets a list of drawn crossings (`words`, `chords`). That holds where the flat metric is not
+//! conformal too: a point with barycentric coordinates b over a face's triangle is then Σ b_i v_i of the vectors v of B's Penner lengths
+//! at u = 0, which is a projective map on each face and agrees on their sides. Drawn curves need
 //! not be in minimal position; reduced, they are the curves that the integers say (`matching`), and pass their places on to them. At last
 //! the places are put in order (`spacing`).
 
@@ -236,12 +238,14 @@ fn check_start(
     }
 }
 
-/// ln of the lengths of B, and a check of the sizes of everything that is indexed.
+/// ln of the lengths that B has at u = 0, and a check of the sizes of everything that is indexed.
 fn logarithms(intrinsic: &Intrinsic) -> Result<EdgeVec<f64>, PositionsError> {
     let (delaunay, flat) = (&intrinsic.delaunay, &intrinsic.flat);
     let length = &intrinsic.delaunay_length;
     let vertices = intrinsic.u.len();
+    let penner = intrinsic.delaunay_penner.as_ref();
     if length.len() != delaunay.edge_count()
+        || penner.is_some_and(|penner| penner.len() != delaunay.edge_count())
         || [&intrinsic.base, delaunay, flat]
             .iter()
             .any(|surface| surface.vertex_count() != vertices)
@@ -255,7 +259,10 @@ fn logarithms(intrinsic: &Intrinsic) -> Result<EdgeVec<f64>, PositionsError> {
         let edge = e.index();
         return Err(PositionsError::Length { edge, length });
     }
-    Ok(length.iter().map(|length| length.ln()).collect())
+    Ok(match penner {
+        Some(penner) => penner.clone(),
+        None => length.iter().map(|length| length.ln()).collect(),
+    })
 }
 
 /// Curves of the edges of `from` on `to`: as many as there are edges, and halfedges that exist.

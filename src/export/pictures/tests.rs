@@ -116,6 +116,7 @@ fn torus(n: u32, m: u32, k: f64) -> AffineAtlas {
             target: VertexVec::filled(0.0, vertices),
             cones: vec![cone(0, -1.0), cone(m / 2 + 3 * m, 1.0)],
             boundary: BoundaryCondition::Free,
+            turning: None,
         },
         flow: FlowParams::default(),
         metric: FlatMetric {

@@ -1,6 +1,9 @@
 //! Why a prescription is refused. Vertices are those of the input file, angles are radians.
 
+use crate::flow::field::FieldError;
+use crate::flow::holonomy::HolonomyError;
 use crate::flow::pi_multiple::in_pi;
+use crate::geometry::connectivity::ConnectivityError;
 
 /// Why there is no target curvature; vertices are those of the input file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -173,6 +176,28 @@ pub enum ConeError {
         /// 2πχ, radians.
         required: f64,
     },
+    /// Cross fields are made on closed surfaces.
+    #[error(
+        "cones.strategy = \"field\" is for closed surfaces, but this one has {boundary_loops} boundary loop{}: close it, or set cones.strategy = \"auto\" with cones.quantum = \"1/2\"", if *.boundary_loops == 1 { "" } else { "s" }
+    )]
+    FieldOnBoundary {
+        /// Number of boundary loops.
+        boundary_loops: usize,
+    },
+    /// A face has no angles.
+    #[error(
+        "cones.strategy = \"field\" needs faces with an area, and the surface has some without: merge their vertices, or set cones.strategy = \"auto\""
+    )]
+    FieldOnFlatFaces,
+    /// There is no cross field.
+    #[error(transparent)]
+    Field(#[from] FieldError),
+    /// The loops of the surface could not be found.
+    #[error(transparent)]
+    Loops(#[from] HolonomyError),
+    /// The surface could not be flipped or doubled.
+    #[error(transparent)]
+    Connectivity(#[from] ConnectivityError),
     /// Not enough interior vertices.
     #[error(
         "{wanted} cones were asked for, but the component has {interior} interior vertices: ask for fewer or refine the mesh"

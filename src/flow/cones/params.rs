@@ -16,6 +16,8 @@ pub enum ConeStrategy {
     Auto,
     /// Those of the list.
     Listed,
+    /// The singular vertices of the smoothest cross field, on closed surfaces.
+    Field,
     /// All curvature at one interior vertex.
     Single,
     /// Equal cones, far from each other.

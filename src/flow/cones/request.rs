@@ -149,6 +149,7 @@ impl ConeStrategy {
         match self {
             ConeStrategy::Auto => "auto",
             ConeStrategy::Listed => "listed",
+            ConeStrategy::Field => "field",
             ConeStrategy::Single => "single",
             ConeStrategy::Spread => "spread",
             ConeStrategy::None => "none",

@@ -1,8 +1,11 @@
 //! Why the flow ends without a metric: every variant names what in the input is at fault, and what to change.
 
 use crate::flow::feasibility::Violation;
+use crate::flow::holonomy::HolonomyError;
 use crate::flow::packing::PackingError;
+use crate::flow::pi_multiple::in_pi;
 use crate::flow::schemes::Scheme;
+use crate::flow::seamless::SeamlessError;
 use crate::flow::solve::SolveError;
 use crate::geometry::connectivity::ConnectivityError;
 use crate::geometry::ids::{EdgeId, FaceId, VertexId};
@@ -63,6 +66,38 @@ pub enum FlowError {
     /// A linear system could not be solved.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// Quarter turns need cones of quarter turns.
+    #[error(
+        "vertex {vertex} has a target curvature of {}π, but transitions that are quarter turns (flow.holonomy = \"quarter-turns\") need multiples of π/2: set cones.quantum = \"1/2\" or cones.strategy = \"field\", or flow.holonomy = \"free\"", in_pi(*.curvature)
+    )]
+    NoQuarterTurns {
+        /// Vertex.
+        vertex: VertexId,
+        /// Its K̄, radians.
+        curvature: f64,
+    },
+    /// Quarter turns are prescribed on closed surfaces.
+    #[error(
+        "flow.holonomy = \"quarter-turns\" is for closed surfaces, but this one has {boundary_loops} boundary loop{}: close it, or set flow.holonomy = \"free\"", if *.boundary_loops == 1 { "" } else { "s" }
+    )]
+    QuarterTurnsOnBoundary {
+        /// Number of boundary loops.
+        boundary_loops: usize,
+    },
+    /// Quarter turns are found by flips alone.
+    #[error(
+        "flow.holonomy = \"quarter-turns\" contradicts {setting}: it needs flow.scheme = \"vertex-scaling\", flow.delaunay = true and flow.solver = \"newton\""
+    )]
+    QuarterTurnsWithout {
+        /// The key and its value.
+        setting: &'static str,
+    },
+    /// No metric has such quarter turns, or none was found.
+    #[error(transparent)]
+    Seamless(#[from] SeamlessError),
+    /// The loops of the surface could not be found.
+    #[error(transparent)]
+    Loops(#[from] HolonomyError),
     /// The minimum was not reached, or it has broken faces.
     #[error("{}", not_converged_message(*.method, *.iterations, *.max_error, *.tolerance, *.broken, .faces))]
     NotConverged {

@@ -14,10 +14,9 @@ use super::params::FlowParams;
 use super::problem::{Problem, Solution};
 use crate::flow::correspondence::Correspondence;
 use crate::flow::delaunay::Delaunay;
-use crate::flow::doubled::Doubled;
-use crate::flow::intrinsic::Intrinsic;
 use crate::flow::metric::{self, Metric};
-use crate::flow::scale::shift;
+use crate::flow::scale::{at_unit_scale, shift};
+use crate::flow::surface_delaunay::SurfaceDelaunay;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, VertexVec};
 use crate::observe::Observer;
@@ -36,31 +35,26 @@ pub(super) fn flow(
     params: &FlowParams,
     observer: &dyn Observer,
 ) -> Result<FlatMetric, FlowError> {
-    let doubled = Doubled::new(surface.connectivity)?;
-    let base_length = doubled.on_both(surface.connectivity, surface.source_length);
-    let Doubled {
-        connectivity: base,
-        original,
-    } = doubled;
-    // A to B: the surface stays, so this fixes its conformal class and not that of its accidental edges.
-    let identity = Correspondence::identity(&base);
-    let mut delaunay = Delaunay::new(base.clone(), &base_length, vec![identity]);
-    delaunay.flip_in_the_surface();
-    let b = delaunay.connectivity.clone();
-    let delaunay_length = exponential(&delaunay.log_lengths());
-    let base_on_delaunay = delaunay.correspondences[0].clone();
+    let ground = SurfaceDelaunay::new(surface.connectivity, surface.source_length)?;
     // B to C.
-    delaunay.correspondences.push(Correspondence::identity(&b));
+    let identity = Correspondence::identity(&ground.delaunay);
+    let mut delaunay = Delaunay::from_logs(
+        ground.delaunay.clone(),
+        ground.log_length.clone(),
+        vec![ground.base_on_delaunay.clone(), identity],
+    );
+    delaunay.flips = ground.flips;
     let on_boundary = |v| surface.connectivity.is_boundary_vertex(v);
     let mut problem = Problem {
         metric: Metric::flipping(&mut delaunay),
-        target: original
+        target: ground
+            .original
             .iter()
             .map(|&v| target[v] * if on_boundary(v) { 2.0 } else { 1.0 })
             .collect(),
         scale_free: prescribed.iter().all(|&p| p),
-        prescribed: original.iter().map(|&v| prescribed[v]).collect(),
-        shares: original.clone(),
+        prescribed: ground.original.iter().map(|&v| prescribed[v]).collect(),
+        shares: ground.original.clone(),
         params,
         observer,
     };
@@ -87,26 +81,20 @@ pub(super) fn flow(
             &delaunay.connectivity,
             &exponential(&delaunay.log_lengths()),
         );
-        let source = metric::total_area(&base, &base_length);
+        let source = metric::total_area(&ground.base, &ground.base_length);
         let constant = 0.5 * (source / flat).ln();
         let constant = if constant.is_finite() { constant } else { 0.0 };
         rest.as_mut_slice().fill(constant);
         shift(&mut u, constant - largest);
     }
     delaunay.rebase(&rest);
-    let (length, c) = (delaunay.log_lengths(), &delaunay.connectivity);
-    let penner = length.enumerate().map(|(e, l)| {
-        let [i, j] = c.edge_vertices(e);
-        l - 0.5 * (u[i] + u[j])
-    });
-    let penner: EdgeVec<f64> = penner.collect();
+    let length = delaunay.log_lengths();
+    let penner = at_unit_scale(&delaunay.connectivity, &length, &u);
     let own = surface.connectivity.vertex_count();
     let curvature = evaluation.curvature.enumerate().take(own);
     let curvature = curvature
         .map(|(v, k)| k * if on_boundary(v) { 0.5 } else { 1.0 })
         .collect();
-    let delaunay_on_flat = delaunay.correspondences.swap_remove(1);
-    let base_on_flat = delaunay.correspondences.swap_remove(0);
     Ok(FlatMetric {
         log_scale: u.as_slice()[..own].to_vec().into(),
         length: exponential(&length),
@@ -114,19 +102,13 @@ pub(super) fn flow(
         history,
         max_curvature_error,
         fit: None,
-        intrinsic: Some(Box::new(Intrinsic {
-            base,
-            base_length,
-            front_faces: surface.connectivity.face_count(),
-            delaunay: b,
-            delaunay_length,
-            flat: delaunay.connectivity,
+        intrinsic: Some(Box::new(ground.leave(
+            surface.connectivity.face_count(),
+            delaunay,
             penner,
             u,
-            base_on_delaunay,
-            delaunay_on_flat,
-            base_on_flat,
-        })),
+            None,
+        ))),
     })
 }
 
@@ -140,6 +122,7 @@ mod tests {
     use super::super::{Scheme, Solver, flow as run};
     use super::*;
     use crate::flow::cones::{BoundaryCondition, Prescription};
+    use crate::flow::doubled::Doubled;
     use crate::geometry::ids::VertexId;
     use std::f64::consts::PI;
 

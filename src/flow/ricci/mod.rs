@@ -24,6 +24,7 @@ pub mod newton;
 mod params;
 mod polish;
 mod problem;
+mod quarter_turns;
 #[cfg(test)]
 pub(crate) mod shapes;
 #[cfg(test)]
@@ -34,7 +35,7 @@ pub use crate::flow::schemes::Scheme;
 pub use crate::flow::step::FlowStep;
 pub use error::{FlowError, Method};
 pub use flat_metric::FlatMetric;
-pub use params::{FlowParams, Solver};
+pub use params::{FlowParams, Holonomy, Solver};
 
 use crate::flow::feasibility::{self, Constraint};
 use crate::flow::metric::{self, Metric, full_angles};
@@ -59,6 +60,7 @@ pub fn flow(
     observer: &dyn Observer,
 ) -> Result<FlatMetric, FlowError> {
     check_input(connectivity, source_length, prescription)?;
+    params.check()?;
     let free = prescription.boundary == BoundaryCondition::Free;
     let prescribed: VertexVec<bool> = connectivity
         .vertices()
@@ -83,7 +85,10 @@ pub fn flow(
             connectivity,
             source_length,
         };
-        return flipping::flow(surface, target, prescribed, params, observer);
+        return match params.holonomy {
+            Holonomy::Free => flipping::flow(surface, target, prescribed, params, observer),
+            Holonomy::QuarterTurns => quarter_turns::flow(surface, prescription, params, observer),
+        };
     }
     let structure = ConformalStructure::new(params.scheme, connectivity, source_length)?;
     let phi: Option<EdgeVec<f64>> = match (params.scheme, &structure.law) {

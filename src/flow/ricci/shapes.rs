@@ -2,7 +2,7 @@
 
 use crate::flow::cones::{BoundaryCondition, Cone, Prescription};
 use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{EdgeVec, VertexId, VertexVec};
+use crate::geometry::ids::{EdgeVec, HalfedgeId, VertexId, VertexVec};
 use std::collections::{BTreeMap, BinaryHeap};
 use std::f64::consts::PI;
 use std::path::PathBuf;
@@ -47,6 +47,7 @@ impl Shape {
             target,
             cones: list,
             boundary: BoundaryCondition::Free,
+            turning: None,
         }
     }
 
@@ -244,6 +245,36 @@ pub(crate) fn plate(genus: usize, level: usize) -> Shape {
         faces.extend([[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
     }
     Shape::new(&format!("genus {genus}"), &faces, &positions)
+}
+
+/// Faces glued along equal letters; a capital runs the other way. All corners are glued as they must be.
+pub(crate) fn glued(words: &[&str]) -> Connectivity {
+    let sides: Vec<char> = words.iter().flat_map(|w| w.chars()).collect();
+    let twin: Vec<Option<HalfedgeId>> = sides
+        .iter()
+        .enumerate()
+        .map(|(h, s)| {
+            let other = |o: char| o != *s && o.eq_ignore_ascii_case(s);
+            let t = (0..sides.len()).find(|&t| t != h && other(sides[t]));
+            t.map(HalfedgeId::new)
+        })
+        .collect();
+    // Corners around a vertex by walking.
+    let mut tail = vec![usize::MAX; sides.len()];
+    let mut vertices = 0;
+    for start in 0..sides.len() {
+        let mut h = start;
+        while tail[h] == usize::MAX {
+            tail[h] = vertices;
+            let prev = h - h % 3 + (h % 3 + 2) % 3;
+            h = twin[prev].unwrap().index();
+        }
+        if tail[start] == vertices {
+            vertices += 1;
+        }
+    }
+    let tail: Vec<VertexId> = tail.into_iter().map(VertexId::new).collect();
+    Connectivity::from_gluing(tail.into(), &twin, vertices).unwrap()
 }
 
 /// A small surface of every kind: genus 0 to 2, one and two boundary loops.

@@ -45,6 +45,7 @@ impl Driver {
                 base_length: length.clone(),
                 delaunay: base.clone(),
                 delaunay_length: length,
+                delaunay_penner: None,
                 flat: base.clone(),
                 base,
                 u,

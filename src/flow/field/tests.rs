@@ -1,0 +1,195 @@
+use super::*;
+use crate::flow::holonomy::homology_basis;
+use crate::flow::metric::face_lengths;
+use crate::flow::ricci::shapes::{self, Shape};
+use crate::flow::signature::FULL_TURN;
+use crate::geometry::ids::{EdgeVec, FaceId};
+use crate::geometry::triangle;
+
+struct Fielded {
+    c: Connectivity,
+    length: EdgeVec<f64>,
+    angle: FaceVec<[f64; 3]>,
+    area: FaceVec<f64>,
+    loops: DualLoops,
+}
+
+fn prepare(shape: &Shape) -> Fielded {
+    let (c, length) = (&shape.connectivity, &shape.length);
+    let sides = |f: FaceId| face_lengths(c, length, f);
+    Fielded {
+        c: c.clone(),
+        length: length.clone(),
+        angle: c
+            .faces()
+            .map(|f| triangle::angles(sides(f)).unwrap())
+            .collect(),
+        area: c
+            .faces()
+            .map(|f| triangle::area(sides(f)).unwrap())
+            .collect(),
+        loops: homology_basis(c).unwrap(),
+    }
+}
+
+fn closed() -> Vec<Shape> {
+    vec![
+        shapes::plate(0, 3),
+        shapes::torus(9, 7),
+        shapes::plate(2, 2),
+        shapes::plate(3, 2),
+    ]
+}
+
+fn energy(field: &CrossField) -> f64 {
+    field.matching.iter().map(|w| w * w).sum()
+}
+
+#[test]
+fn signatures_are_integers_that_meet_gauss_bonnet() {
+    for shape in closed() {
+        let x = prepare(&shape);
+        let field = cross_field(&x.c, &x.angle, &x.area).unwrap();
+        let signature = field.signature(&x.c, &x.angle, &x.loops).unwrap();
+        let curvature: i64 = signature.cone.iter().map(|k| FULL_TURN - k).sum();
+        let chi = x.c.topology().euler_characteristic;
+        assert_eq!(curvature, FULL_TURN * chi, "{}", shape.name);
+        assert_eq!(signature.turning.len(), x.loops.len());
+        for h in x.c.halfedges() {
+            let t = x.c.twin(h).unwrap();
+            assert_eq!(field.matching[h], -field.matching[t]);
+            assert!(field.matching[h].abs() <= 0.5 * FRAC_PI_2 + 1e-12);
+        }
+    }
+}
+
+/// A torus of squares has a parallel field: no cones, and none of its loops turns.
+#[test]
+fn the_field_of_a_flat_torus_is_parallel() {
+    let mut shape = shapes::torus(12, 9);
+    let c = &shape.connectivity;
+    let is_diagonal = |e| {
+        let steps = c.edge_vertices(e).map(|v| [v.index() / 9, v.index() % 9]);
+        (0..2).all(|k| steps[0][k] != steps[1][k])
+    };
+    let length = c
+        .edges()
+        .map(|e| if is_diagonal(e) { 2.0_f64.sqrt() } else { 1.0 });
+    shape.length = length.collect();
+    let x = prepare(&shape);
+    let field = cross_field(&x.c, &x.angle, &x.area).unwrap();
+    assert!(field.matching.iter().all(|w| w.abs() < 1e-6));
+    let signature = field.signature(&x.c, &x.angle, &x.loops).unwrap();
+    assert!(signature.cone.iter().all(|&k| k == FULL_TURN));
+    assert!(signature.turning.iter().all(|&k| k == 0));
+}
+
+/// Turning single faces raises the energy: the eigenvector is a least one.
+#[test]
+fn no_face_can_turn_to_make_the_field_smoother() {
+    let x = prepare(&shapes::plate(2, 3));
+    let field = cross_field(&x.c, &x.angle, &x.area).unwrap();
+    let mut smoother = 0;
+    for f in x.c.faces() {
+        let around = x.c.face_halfedges(f);
+        let now: f64 = around.iter().map(|&h| field.matching[h].powi(2)).sum();
+        let least = [-0.15, 0.15].map(|turn| {
+            let turned = around.iter().map(|&h| {
+                let w = field.matching[h] - turn;
+                (w - (w / FRAC_PI_2).round() * FRAC_PI_2).powi(2)
+            });
+            turned.sum::<f64>()
+        });
+        smoother += usize::from(least[0].min(least[1]) < now - 0.02);
+    }
+    // The lengths of the vectors count too, near cones; a field without pattern has a third of such faces.
+    assert!(
+        20 * smoother < x.c.face_count(),
+        "{smoother} of {}",
+        x.c.face_count()
+    );
+    assert!(energy(&field) < 0.02 * x.c.edge_count() as f64 * 2.0);
+}
+
+/// A matching that is no field's is found out.
+#[test]
+fn a_broken_matching_is_refused() {
+    let x = prepare(&shapes::torus(9, 7));
+    let field = cross_field(&x.c, &x.angle, &x.area).unwrap();
+    let mut broken = field.clone();
+    broken.matching[x.c.corner_halfedge(FaceId::new(3), 0)] += 0.1;
+    let error = broken.signature(&x.c, &x.angle, &x.loops).unwrap_err();
+    assert!(
+        matches!(error, FieldError::BrokenCone { residual, .. } if (residual.abs() - 0.1).abs() < 1e-9)
+    );
+}
+
+/// A sphere with spikes, whose tips the field makes sharp cones.
+fn spiky() -> Shape {
+    let shape = shapes::plate(0, 6);
+    let c = &shape.connectivity;
+    let mut length = shape.length.clone();
+    let mean = length.iter().sum::<f64>() / length.len() as f64;
+    for v in shape.spread(6) {
+        for h in c.outgoing(VertexId::new(v)) {
+            length[c.edge(h)] = 4.0 * mean;
+        }
+    }
+    Shape { length, ..shape }
+}
+
+#[test]
+fn sharp_cones_are_given_quarter_turns() {
+    let x = prepare(&spiky());
+    let mut field = cross_field(&x.c, &x.angle, &x.area).unwrap();
+    let before = field.signature(&x.c, &x.angle, &x.loops).unwrap();
+    let lacking: i64 = before.cone.iter().map(|k| (3 - k).max(0)).sum();
+    assert!(lacking > 0, "the spikes are no sharp cones");
+    let (signature, moved) = field
+        .grid_signature(&x.c, &x.length, &x.angle, &x.loops, 3)
+        .unwrap();
+    assert_eq!(moved as i64, lacking);
+    assert!(signature.cone.iter().all(|&k| k >= 3));
+    signature.check(&x.c, &x.loops).unwrap();
+    // The changed field is a field still.
+    assert_eq!(
+        field.signature(&x.c, &x.angle, &x.loops).unwrap(),
+        signature
+    );
+    let mut again = cross_field(&x.c, &x.angle, &x.area).unwrap();
+    assert_eq!(
+        again
+            .grid_signature(&x.c, &x.length, &x.angle, &x.loops, 3)
+            .unwrap()
+            .0,
+        signature
+    );
+}
+
+#[test]
+fn four_vertices_are_too_few_for_a_grid() {
+    let positions = [
+        [1.0, 1.0, 1.0],
+        [1.0, -1.0, -1.0],
+        [-1.0, 1.0, -1.0],
+        [-1.0, -1.0, 1.0],
+    ];
+    let faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]];
+    let x = prepare(&Shape::new("tetrahedron", &faces, &positions));
+    let mut field = cross_field(&x.c, &x.angle, &x.area).unwrap();
+    let error = field
+        .grid_signature(&x.c, &x.length, &x.angle, &x.loops, 3)
+        .unwrap_err();
+    assert_eq!(
+        error,
+        FieldError::TooFewVertices {
+            vertices: 4,
+            least: 3
+        }
+    );
+    assert!(
+        field
+            .grid_signature(&x.c, &x.length, &x.angle, &x.loops, 1)
+            .is_ok()
+    );
+}

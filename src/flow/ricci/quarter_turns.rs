@@ -1,0 +1,277 @@
+//! Metrics whose transitions are quarter turns: cones *and* the turning of every loop are prescribed.
+//!
+//! *Enters:* a closed surface, cones of multiples of π/2. *Leaves:* a [`FlatMetric`] like that of the conformal flow, with the scale that comes nearest to it.
+//! *Guaranteed:* cones and turnings to the tolerance, or an error. *Not guaranteed:* that the metric is conformal: where the surface has handles no
+//! conformal one need exist.
+//!
+//! Where the cones are those of a cross field, its turnings come with them ([`Prescription::turning`]). Otherwise they are the quarter turns nearest to
+//! what loops turn in the conformal metric with these cones, which is found first: so little is left to change.
+
+use super::error::FlowError;
+use super::flat_metric::FlatMetric;
+use super::flipping::{self, Surface};
+use super::params::FlowParams;
+use crate::flow::correspondence::Correspondence;
+use crate::flow::delaunay::Delaunay;
+use crate::flow::holonomy::{DualLoops, homology_basis};
+use crate::flow::prescription::Prescription;
+use crate::flow::scale::at_unit_scale;
+use crate::flow::schemes::FaceShape;
+use crate::flow::seamless::{SeamlessParams, SeamlessStep, seamless};
+use crate::flow::signature::{FULL_TURN, Signature};
+use crate::flow::step::FlowStep;
+use crate::flow::surface_delaunay::SurfaceDelaunay;
+use crate::flow::vertex_scale::nearest_scale;
+use crate::geometry::ids::{EdgeVec, FaceVec, VertexId, VertexVec};
+use crate::observe::Observer;
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+/// Curvatures that are multiples of π/2 up to rounding are so to this, radians.
+const ROUNDING: f64 = 1e-9;
+
+/// See the module docs.
+pub(super) fn flow(
+    surface: Surface,
+    prescription: &Prescription,
+    params: &FlowParams,
+    observer: &dyn Observer,
+) -> Result<FlatMetric, FlowError> {
+    let c = surface.connectivity;
+    if !c.is_closed() {
+        let boundary_loops = c.boundary_loops().len();
+        return Err(FlowError::QuarterTurnsOnBoundary { boundary_loops });
+    }
+    let cone = quarters(&prescription.target)?;
+    let ground = SurfaceDelaunay::new(c, surface.source_length)?;
+    let loops = homology_basis(&ground.delaunay)?;
+    let turning = match &prescription.turning {
+        Some(turning) => turning.clone(),
+        None => {
+            let prescribed = VertexVec::filled(true, c.vertex_count());
+            let target = prescription.target.clone();
+            let conformal = flipping::flow(surface, target, prescribed, params, observer)?;
+            let turning = turning_at(&ground, &conformal.log_scale, &loops);
+            turning
+                .iter()
+                .map(|t| (t / FRAC_PI_2).round() as i64)
+                .collect()
+        }
+    };
+    let signature = Signature { cone, turning };
+    let found = seamless(
+        &ground.delaunay,
+        &ground.length(),
+        &loops,
+        &signature,
+        &SeamlessParams {
+            tolerance: params.curvature_tolerance,
+            conformality: params.conformality,
+            max_steps: params.max_newton_steps,
+        },
+        observer,
+    )?;
+    let log_length = found.penner.iter().map(|l| 0.5 * l).collect();
+    let history = found.history.iter().map(line).collect();
+    let metric = with_lengths(ground, log_length)?;
+    Ok(FlatMetric {
+        history,
+        max_curvature_error: found.max_error,
+        ..metric
+    })
+}
+
+/// The metric that B has with other lengths (natural logarithms, Penner coordinates), whose Delaunay triangulation must be flat but for cones; for closed
+/// surfaces. The record of how it was found is empty.
+pub(crate) fn with_lengths(
+    ground: SurfaceDelaunay,
+    log_length: EdgeVec<f64>,
+) -> Result<FlatMetric, FlowError> {
+    let parts = log_length.iter().zip(ground.log_length.iter());
+    let change: EdgeVec<f64> = parts.map(|(to, from)| to - from).collect();
+    let u = nearest_scale(&ground.delaunay, &change)?;
+    let delaunay_penner = at_unit_scale(&ground.delaunay, &log_length, &u);
+    let (flat, shape) = flipped(&ground, log_length);
+    let c = &flat.connectivity;
+    let mut curvature = VertexVec::filled(TAU, c.vertex_count());
+    for (f, shape) in shape.enumerate() {
+        let corners = c.face_vertices(f).into_iter().zip(shape.angle);
+        corners.for_each(|(v, angle)| curvature[v] -= angle);
+    }
+    let log_length = flat.log_lengths();
+    let penner = at_unit_scale(c, &log_length, &u);
+    let front_faces = ground.base.face_count();
+    Ok(FlatMetric {
+        log_scale: u.clone(),
+        length: log_length.iter().map(|l| l.exp()).collect(),
+        curvature,
+        history: Vec::new(),
+        max_curvature_error: 0.0,
+        fit: None,
+        intrinsic: Some(Box::new(ground.leave(
+            front_faces,
+            flat,
+            penner,
+            u,
+            Some(delaunay_penner),
+        ))),
+    })
+}
+
+/// Cone angles in quarter turns.
+fn quarters(target: &VertexVec<f64>) -> Result<VertexVec<i64>, FlowError> {
+    let of = |(vertex, &curvature): (VertexId, &f64)| {
+        let turns = (curvature / FRAC_PI_2).round();
+        match (curvature - turns * FRAC_PI_2).abs() <= ROUNDING {
+            true => Ok(FULL_TURN - turns as i64),
+            false => Err(FlowError::NoQuarterTurns { vertex, curvature }),
+        }
+    };
+    target.enumerate().map(of).collect()
+}
+
+/// B with other lengths, flipped until it is Delaunay, with the shapes of its faces; told are the correspondences of A and of B with it.
+fn flipped(ground: &SurfaceDelaunay, log_length: EdgeVec<f64>) -> (Delaunay, FaceVec<FaceShape>) {
+    let b = &ground.delaunay;
+    let correspondences = vec![ground.base_on_delaunay.clone(), Correspondence::identity(b)];
+    let mut flat = Delaunay::from_logs(b.clone(), log_length, correspondences);
+    let mut shape = FaceVec::default();
+    flat.evaluate(&VertexVec::filled(0.0, b.vertex_count()), &mut shape);
+    (flat, shape)
+}
+
+/// By how much loops on B turn in the metric with the scale `u`, radians.
+fn turning_at(ground: &SurfaceDelaunay, u: &VertexVec<f64>, loops: &DualLoops) -> Vec<f64> {
+    let b = &ground.delaunay;
+    let mut flat = Delaunay::from_logs(b.clone(), ground.log_length.clone(), Vec::new());
+    flat.record = Some(Vec::new());
+    let mut shape = FaceVec::default();
+    flat.evaluate(u, &mut shape);
+    let c = &flat.connectivity;
+    let mut loops = loops.clone();
+    for flip in flat.record.iter().flatten() {
+        loops.flipped(c, &flip.flip);
+    }
+    loops.turning(c, |corner| shape[c.face(corner)].angle[c.corner(corner)])
+}
+
+/// A line of the convergence record.
+fn line(step: &SeamlessStep) -> FlowStep {
+    FlowStep {
+        iteration: step.iteration,
+        max_error: step.max_error,
+        energy: step.energy,
+        step: step.step,
+        flips: step.flips,
+        flow_time: step.iteration as f64,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Holonomy, flow as run, shapes};
+    use super::*;
+    use std::f64::consts::PI;
+
+    fn params(holonomy: Holonomy) -> FlowParams {
+        FlowParams {
+            holonomy,
+            ..FlowParams::default()
+        }
+    }
+
+    /// Where lengths change by a scale, everything is as the conformal flow leaves it.
+    #[test]
+    fn a_conformal_change_is_that_of_the_conformal_flow() {
+        for shape in [
+            shapes::plate(0, 2),
+            shapes::torus(9, 7),
+            shapes::plate(2, 2),
+        ] {
+            let (c, length) = (&shape.connectivity, &shape.length);
+            let prescription = shape.prescribe_default();
+            let expected = run(c, length, &prescription, &params(Holonomy::Free), &()).unwrap();
+            let x = expected.intrinsic.as_ref().unwrap();
+            let ground = SurfaceDelaunay::new(c, length).unwrap();
+            let scaled = |(e, l): (_, &f64)| {
+                let [i, j] = x.delaunay.edge_vertices(e);
+                l + 0.5 * (x.u[i] + x.u[j])
+            };
+            let log_length = ground.log_length.enumerate().map(scaled).collect();
+            let found = with_lengths(ground, log_length).unwrap();
+            let y = found.intrinsic.as_ref().unwrap();
+            let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} against {b}");
+            x.u.iter().zip(y.u.iter()).for_each(|(a, b)| close(*a, *b));
+            let unit = y.delaunay_penner.as_ref().unwrap();
+            x.delaunay_length
+                .iter()
+                .zip(unit.iter())
+                .for_each(|(a, b)| close(a.ln(), *b));
+            expected
+                .curvature
+                .iter()
+                .zip(found.curvature.iter())
+                .for_each(|(a, b)| {
+                    assert!((a - b).abs() < 1e-9, "{a} against {b}");
+                });
+        }
+    }
+
+    /// Cones that are given, on a surface with handles: the loops turn by quarters too, and hardly anything else changes.
+    #[test]
+    fn loops_turn_by_the_nearest_quarters() {
+        let shape = shapes::plate(2, 2);
+        let (c, length) = (&shape.connectivity, &shape.length);
+        let count = 8;
+        let places = shape.spread(count);
+        let cones: Vec<(usize, f64)> = places.iter().map(|&v| (v, -0.5 * PI)).collect();
+        let prescription = shape.prescribe(&cones);
+        let conformal = run(c, length, &prescription, &params(Holonomy::Free), &()).unwrap();
+        let found = run(
+            c,
+            length,
+            &prescription,
+            &params(Holonomy::QuarterTurns),
+            &(),
+        )
+        .unwrap();
+        assert!(found.max_curvature_error <= 1e-10);
+        let loops = homology_basis(&found.intrinsic.as_ref().unwrap().delaunay).unwrap();
+        let ground = SurfaceDelaunay::new(c, length).unwrap();
+        let before = turning_at(&ground, &conformal.log_scale, &loops);
+        let off = |t: &f64| (t / FRAC_PI_2 - (t / FRAC_PI_2).round()).abs();
+        assert!(
+            before.iter().any(|t| off(t) > 1e-3),
+            "no loop is off: {before:?}"
+        );
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_in_words() {
+        let sphere = shapes::plate(0, 2);
+        let places = sphere.spread(3);
+        let cones: Vec<(usize, f64)> = places.iter().map(|&v| (v, 4.0 / 3.0 * PI)).collect();
+        let quarter_turns = params(Holonomy::QuarterTurns);
+        let refuse = |shape: &shapes::Shape, cones: &[(usize, f64)], params: &FlowParams| {
+            let (c, length) = (&shape.connectivity, &shape.length);
+            run(c, length, &shape.prescribe(cones), params, &())
+                .unwrap_err()
+                .to_string()
+        };
+        let said = refuse(&sphere, &cones, &quarter_turns);
+        assert!(
+            said.contains("4/3π") && said.contains("cones.quantum"),
+            "{said}"
+        );
+        let said = refuse(&shapes::sheet(5, false), &[], &quarter_turns);
+        assert!(said.contains("1 boundary loop:"), "{said}");
+        let gradient = FlowParams {
+            solver: super::super::Solver::Gradient,
+            ..quarter_turns
+        };
+        let said = refuse(&sphere, &cones, &gradient);
+        assert!(said.contains("flow.solver = \"gradient\""), "{said}");
+        let torus = shapes::torus(9, 7);
+        let said = refuse(&torus, &[(0, 0.5 * PI), (30, -0.5 * PI)], &quarter_turns);
+        assert!(said.contains("no torus has just two cones"), "{said}");
+    }
+}

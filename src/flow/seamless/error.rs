@@ -1,0 +1,65 @@
+//! Why there is no seamless metric.
+
+use crate::flow::signature::Infeasible;
+use crate::flow::solve::SolveError;
+use crate::geometry::ids::EdgeId;
+
+/// Why there is no seamless metric.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SeamlessError {
+    /// Not one length an edge.
+    #[error("{given} lengths were given for {needed} edges")]
+    Count {
+        /// How many were given.
+        given: usize,
+        /// How many are needed.
+        needed: usize,
+    },
+    /// The surface has a boundary.
+    #[error(
+        "seamless metrics are made on closed surfaces only: this one has {boundary_loops} boundary loops"
+    )]
+    NotClosed {
+        /// Number of boundary loops.
+        boundary_loops: usize,
+    },
+    /// A length is zero, negative, or no number.
+    #[error("edge {edge} has length {length:e}; weld or remove the degenerate faces at it")]
+    BadLength {
+        /// Edge.
+        edge: EdgeId,
+        /// Its length.
+        length: f64,
+    },
+    /// No metric has the signature.
+    #[error(transparent)]
+    Infeasible(#[from] Infeasible),
+    /// Newton's steps became ever shorter, or too many.
+    #[error(
+        "no seamless metric was found: after {iterations} steps the largest error of a cone angle or a turning is {max_error:.3e} rad (bound {tolerance:.1e}), and {step:.1e} of a step was taken last; cones that are far from where the surface bends, or turnings far from its own, may have no metric: let the field choose them, or ask for other ones"
+    )]
+    Stalled {
+        /// Steps taken.
+        iterations: usize,
+        /// Largest error where it ended, radians.
+        max_error: f64,
+        /// What was asked for, radians.
+        tolerance: f64,
+        /// Part of the last Newton step that was taken; 0 where none could be.
+        step: f64,
+    },
+    /// The angles are met, but in float64 some faces are no triangles.
+    #[error(
+        "the seamless metric has {faces} faces that are no triangles in float64's 16 digits: remove vertices that nearly coincide and faces without width from the mesh"
+    )]
+    BrokenFaces {
+        /// How many.
+        faces: usize,
+    },
+    /// The linear system could not be solved.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// The observer asked to stop.
+    #[error("the seamless metric was cancelled")]
+    Cancelled,
+}

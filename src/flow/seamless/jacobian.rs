@@ -1,0 +1,256 @@
+//! Derivatives of cone angles and turnings by λ.
+//!
+//! *Enters:* a [`State`]. *Leaves:* sparse matrices by columns: one column an edge of the given triangulation, one row an equation. *Guaranteed:* exact at
+//! every λ, also across flips, where the derivative is continuous.
+//!
+//! By the lengths of the Delaunay triangulation, with w_k = ½ cot θ_k, a face has ∂θ_k/∂λ_k = w_i + w_j and ∂θ_k/∂λ_i = −w_j (λ_k opposite corner k). Those lengths
+//! depend on λ by the rows of T: the unit row where an edge was never flipped, else d λ_dc = −d λ_ab + w (d λ_ad + d λ_bc) + (1 − w)(d λ_ca + d λ_db)
+//! one flip after another.
+
+use super::state::{State, equation};
+use crate::flow::delaunay::PtolemyFlip;
+use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, NONE};
+
+/// A sparse matrix by columns; no row occurs twice in a column.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Columns {
+    /// Column c has the entries `first[c]..first[c + 1]`.
+    first: Vec<u32>,
+    row: Vec<u32>,
+    value: Vec<f64>,
+}
+
+/// How flipped edges depend on λ.
+struct FlippedRows {
+    /// Number of the row of an edge, `NONE` where it was never flipped.
+    number: EdgeVec<u32>,
+    edge: Vec<EdgeId>,
+    row: Vec<Vec<(u32, f64)>>,
+}
+
+/// Adds up the entries of one column.
+struct Collector {
+    sum: Vec<f64>,
+    /// The column in which a row was last met.
+    met: Vec<u32>,
+    rows: Vec<u32>,
+}
+
+impl Columns {
+    fn with_capacity(columns: usize, entries: usize) -> Self {
+        let mut first = Vec::with_capacity(columns + 1);
+        first.push(0);
+        Self {
+            first,
+            row: Vec::with_capacity(entries),
+            value: Vec::with_capacity(entries),
+        }
+    }
+
+    /// Rows and values of a column.
+    pub(super) fn column(&self, c: usize) -> (&[u32], &[f64]) {
+        let range = self.first[c] as usize..self.first[c + 1] as usize;
+        (&self.row[range.clone()], &self.value[range])
+    }
+
+    /// Number of columns.
+    pub(super) fn count(&self) -> usize {
+        self.first.len() - 1
+    }
+
+    /// The inner product of a column with `by`.
+    pub(super) fn dot(&self, c: usize, by: &[f64]) -> f64 {
+        let (rows, values) = self.column(c);
+        let parts = rows.iter().zip(values).map(|(&r, v)| v * by[r as usize]);
+        parts.sum()
+    }
+
+    /// The matrix times `by`, for `rows` rows.
+    pub(super) fn times(&self, by: &EdgeVec<f64>, rows: usize) -> Vec<f64> {
+        let mut product = vec![0.0; rows];
+        for (c, by) in by.iter().enumerate() {
+            let (rows, values) = self.column(c);
+            for (&r, v) in rows.iter().zip(values) {
+                product[r as usize] += v * by;
+            }
+        }
+        product
+    }
+
+    fn close(&mut self, collector: &mut Collector) {
+        for &r in &collector.rows {
+            self.row.push(r);
+            self.value.push(collector.sum[r as usize]);
+        }
+        collector.rows.clear();
+        self.first.push(self.row.len() as u32);
+    }
+}
+
+impl Collector {
+    fn new(rows: usize) -> Self {
+        Self {
+            sum: vec![0.0; rows],
+            met: vec![NONE; rows],
+            rows: Vec::new(),
+        }
+    }
+
+    fn add(&mut self, column: usize, row: u32, value: f64) {
+        let r = row as usize;
+        if self.met[r] != column as u32 {
+            self.met[r] = column as u32;
+            self.sum[r] = 0.0;
+            self.rows.push(row);
+        }
+        self.sum[r] += value;
+    }
+}
+
+impl State {
+    /// ∂(angles)/∂λ: a column an edge of the given triangulation.
+    pub(super) fn by_edges(&self, equations: usize) -> Columns {
+        let c = &self.connectivity;
+        let edges = c.edge_count();
+        let flipped = FlippedRows::new(&self.flips, edges);
+        let (first, dependent) = flipped.by_edge(edges);
+        let mut columns = Columns::with_capacity(edges, 4 * edges + edges / 2);
+        let mut collector = Collector::new(equations);
+        for e in c.edges() {
+            let column = e.index();
+            if flipped.number[e] == NONE {
+                self.add_edge(e, 1.0, column, &mut collector);
+            }
+            for &(of, share) in &dependent[first[column] as usize..first[column + 1] as usize] {
+                self.add_edge(of, share, column, &mut collector);
+            }
+            columns.close(&mut collector);
+        }
+        columns
+    }
+
+    /// ∂(angles)/∂u for a scale u at every vertex: a column a vertex. Scales commute with flips, so T is not needed.
+    pub(super) fn by_scales(&self, equations: usize) -> Columns {
+        let c = &self.connectivity;
+        let vertices = c.vertex_count();
+        let mut columns = Columns::with_capacity(vertices, 8 * vertices);
+        let mut collector = Collector::new(equations);
+        for v in c.vertices() {
+            for h in c.outgoing(v) {
+                let (f, k) = (c.face(h), c.corner(h));
+                let weight = self.shape[f].weight;
+                // ∂θ_i/∂u_k is the weight of the third corner, and angles of a face sum to π.
+                let derivative = |corner: usize| match corner == k {
+                    true => -(weight[(k + 1) % 3] + weight[(k + 2) % 3]),
+                    false => weight[3 - corner - k],
+                };
+                self.add_corners(f, derivative, v.index(), &mut collector);
+            }
+            columns.close(&mut collector);
+        }
+        columns
+    }
+
+    /// `share` times the derivatives by the length of one edge of the Delaunay triangulation.
+    fn add_edge(&self, e: EdgeId, share: f64, column: usize, collector: &mut Collector) {
+        let c = &self.connectivity;
+        let h = c.edge_halfedge(e);
+        for h in [Some(h), c.twin(h)].into_iter().flatten() {
+            let opposite = (c.corner(h) + 2) % 3;
+            let weight = self.shape[c.face(h)].weight;
+            let derivative = |corner: usize| match corner == opposite {
+                true => share * (weight[(corner + 1) % 3] + weight[(corner + 2) % 3]),
+                false => -share * weight[3 - corner - opposite],
+            };
+            self.add_corners(c.face(h), derivative, column, collector);
+        }
+    }
+
+    /// Adds derivatives of the three angles of a face to the equations that they occur in.
+    fn add_corners(
+        &self,
+        f: FaceId,
+        derivative: impl Fn(usize) -> f64,
+        column: usize,
+        collector: &mut Collector,
+    ) {
+        let c = &self.connectivity;
+        for (corner, v) in c.face_vertices(f).into_iter().enumerate() {
+            if let Some(row) = equation(v) {
+                collector.add(column, row, derivative(corner));
+            }
+        }
+        let cones = c.vertex_count() - 1;
+        for turn in self.loops.turns_in(c, f) {
+            let row = (cones + turn.of) as u32;
+            collector.add(column, row, turn.sign * derivative(c.corner(turn.corner)));
+        }
+    }
+}
+
+impl FlippedRows {
+    fn new(flips: &[PtolemyFlip], edges: usize) -> Self {
+        let mut rows = Self {
+            number: EdgeVec::filled(NONE, edges),
+            edge: Vec::new(),
+            row: Vec::new(),
+        };
+        let mut collector = Collector::new(edges);
+        for (i, flip) in flips.iter().enumerate() {
+            let [ca, ad, db, bc] = flip.outer;
+            let rest = 1.0 - flip.share;
+            let parts = [
+                (flip.edge, -1.0),
+                (ad, flip.share),
+                (bc, flip.share),
+                (ca, rest),
+                (db, rest),
+            ];
+            for (e, share) in parts {
+                match rows.number[e] {
+                    NONE => collector.add(i, e.raw(), share),
+                    n => {
+                        for &(on, value) in &rows.row[n as usize] {
+                            collector.add(i, on, share * value);
+                        }
+                    }
+                }
+            }
+            let row = collector
+                .rows
+                .drain(..)
+                .map(|r| (r, collector.sum[r as usize]));
+            let row: Vec<(u32, f64)> = row.collect();
+            match rows.number[flip.edge] {
+                NONE => {
+                    rows.number[flip.edge] = rows.row.len() as u32;
+                    rows.edge.push(flip.edge);
+                    rows.row.push(row);
+                }
+                n => rows.row[n as usize] = row,
+            }
+        }
+        rows
+    }
+
+    /// Which flipped edges depend on an edge, and how: entries `first[e]..first[e + 1]` for the edge e.
+    fn by_edge(&self, edges: usize) -> (Vec<u32>, Vec<(EdgeId, f64)>) {
+        let mut first = vec![0u32; edges + 1];
+        for &(on, _) in self.row.iter().flatten() {
+            first[on as usize + 1] += 1;
+        }
+        for e in 0..edges {
+            first[e + 1] += first[e];
+        }
+        let mut next = first.clone();
+        let mut entries = vec![(EdgeId::new(0), 0.0); first[edges] as usize];
+        for (row, &edge) in self.row.iter().zip(&self.edge) {
+            for &(on, value) in row {
+                let place = &mut next[on as usize];
+                entries[*place as usize] = (edge, value);
+                *place += 1;
+            }
+        }
+        (first, entries)
+    }
+}

@@ -1,0 +1,62 @@
+//! How long a change of log-lengths is.
+//!
+//! A step of Newton has many solutions; the shortest in this norm is taken. Its inverse is W⁻¹ + τ B V⁻¹ Bᵀ: with d = r + B u, where B
+//! adds the u of both ends of an edge, the square of the length of d is the least of Σ W r² + Σ V u² / τ. W weighs edges by the area of
+//! their faces and V vertices by theirs, each by its mean: without that the change would follow the sampling of the mesh. For
+//! τ = 0 scales are nothing special; as τ grows they become free, and the metric as conformal as the turnings let it.
+
+use crate::flow::metric::face_lengths;
+use crate::geometry::connectivity::Connectivity;
+use crate::geometry::ids::{EdgeVec, VertexVec};
+use crate::geometry::triangle;
+
+/// Least weight relative to the mean: beyond it, a smaller face is as free as it can matter, and the system would lose digits.
+const LEAST_WEIGHT: f64 = 1e-6;
+
+/// Diagonals of the inverse norm.
+#[derive(Clone, Debug)]
+pub(super) struct Norm {
+    /// W⁻¹.
+    pub(super) edge: EdgeVec<f64>,
+    /// τ V⁻¹; `None` for τ = 0.
+    pub(super) vertex: Option<VertexVec<f64>>,
+}
+
+impl Norm {
+    /// Weights by area, for a conformality τ.
+    pub(super) fn by_area(c: &Connectivity, length: &EdgeVec<f64>, conformality: f64) -> Self {
+        let mut edge = EdgeVec::filled(0.0, c.edge_count());
+        let mut vertex = VertexVec::filled(0.0, c.vertex_count());
+        for f in c.faces() {
+            let area = triangle::area(face_lengths(c, length, f)).unwrap_or(0.0);
+            for h in c.face_halfedges(f) {
+                edge[c.edge(h)] += area;
+                vertex[c.tail(h)] += area;
+            }
+        }
+        let is_conformal = conformality > 0.0;
+        Self {
+            edge: inverse(edge.as_slice(), 1.0).into(),
+            vertex: is_conformal.then(|| inverse(vertex.as_slice(), conformality).into()),
+        }
+    }
+
+    /// Every edge and vertex the same.
+    #[cfg(test)]
+    pub(super) fn uniform(c: &Connectivity, conformality: f64) -> Self {
+        let is_conformal = conformality > 0.0;
+        Self {
+            edge: EdgeVec::filled(1.0, c.edge_count()),
+            vertex: is_conformal.then(|| VertexVec::filled(conformality, c.vertex_count())),
+        }
+    }
+}
+
+fn inverse(weight: &[f64], factor: f64) -> Vec<f64> {
+    let mean = weight.iter().sum::<f64>() / weight.len().max(1) as f64;
+    let relative = |w: &f64| match mean > 0.0 {
+        true => (w / mean).max(LEAST_WEIGHT),
+        false => 1.0,
+    };
+    weight.iter().map(|w| factor / relative(w)).collect()
+}

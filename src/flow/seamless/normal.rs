@@ -1,0 +1,159 @@
+//! The shortest solution of A d = F, for the Jacobian A and a [`Norm`] M: d = M⁻¹ Aᵀ μ with (A M⁻¹ Aᵀ) μ = F.
+//!
+//! *Enters:* a [`State`]. *Leaves:* a factor of A M⁻¹ Aᵀ and directions. The cone angles of two vertices are coupled where some edge moves both, about 19 entries a row; a
+//! loop is coupled with all vertices near it. So the loops come last in the elimination: rows that are long but few do not fill the rest.
+
+use super::jacobian::Columns;
+use super::norm::Norm;
+use super::state::{Problem, State};
+use crate::flow::solve::{SolveError, SymmetricSolver};
+use crate::geometry::ids::{EdgeId, EdgeVec, VertexId};
+
+/// Shifts of the diagonal, relative to its mean, tried in turn until the matrix is positive definite.
+const SHIFTS: [f64; 4] = [1e-14, 1e-12, 1e-10, 1e-8];
+
+/// The system at one λ.
+pub(super) struct Normal {
+    solver: SymmetricSolver,
+    pairs: Vec<[u32; 2]>,
+    by_edges: Columns,
+    /// Where scales are cheaper.
+    by_scales: Option<Columns>,
+}
+
+/// A M⁻¹ Aᵀ, off-diagonal entries in the order of the pairs.
+struct Products {
+    /// Equations of cones; loops are above.
+    cones: usize,
+    loops: usize,
+    pairs: Vec<[u32; 2]>,
+    values: Vec<f64>,
+    diagonal: Vec<f64>,
+    /// Loops with loops, lower triangle by rows.
+    among_loops: Vec<f64>,
+}
+
+impl Normal {
+    /// Factorises at `state`; what `last` has is used again where the pattern is the same.
+    pub(super) fn new(
+        problem: &Problem,
+        state: &State,
+        norm: &Norm,
+        last: Option<Self>,
+    ) -> Result<Self, SolveError> {
+        let equations = problem.equations();
+        let by_edges = state.by_edges(equations);
+        let by_scales = norm.vertex.is_some().then(|| state.by_scales(equations));
+        let mut products = Products::new(problem.cone_equations(), equations);
+        products.add(&by_edges, norm.edge.as_slice());
+        if let (Some(columns), Some(weight)) = (&by_scales, &norm.vertex) {
+            products.add(columns, weight.as_slice());
+        }
+        products.list_loops();
+        let Products {
+            loops,
+            pairs,
+            values,
+            mut diagonal,
+            ..
+        } = products;
+        // An order that is kept although edges were flipped lets the factor fill up: twice over for one edge in a hundred.
+        let mut solver = match last {
+            Some(last) if last.pairs == pairs => last.solver,
+            Some(last) => last.solver.renewed(loops, &pairs)?,
+            None => SymmetricSolver::with_border(equations, loops, &pairs)?,
+        };
+        let mean = diagonal.iter().sum::<f64>() / equations.max(1) as f64;
+        let mut shifted = 0.0;
+        let mut result = Ok(());
+        for shift in SHIFTS {
+            diagonal
+                .iter_mut()
+                .for_each(|d| *d += (shift - shifted) * mean);
+            shifted = shift;
+            result = solver.factorize(&diagonal, &values);
+            if result.is_ok() {
+                break;
+            }
+        }
+        result?;
+        Ok(Self {
+            solver,
+            pairs,
+            by_edges,
+            by_scales,
+        })
+    }
+
+    /// The direction d, and A d.
+    pub(super) fn direction(
+        &mut self,
+        problem: &Problem,
+        norm: &Norm,
+        missing: &[f64],
+    ) -> (EdgeVec<f64>, Vec<f64>) {
+        let mut multiplier = missing.to_vec();
+        self.solver.solve(&mut multiplier);
+        let parts = norm.edge.iter().enumerate();
+        let parts = parts.map(|(e, weight)| weight * self.by_edges.dot(e, &multiplier));
+        let mut direction: EdgeVec<f64> = parts.collect();
+        if let (Some(columns), Some(weight)) = (&self.by_scales, &norm.vertex) {
+            let scale: Vec<f64> = (0..columns.count())
+                .map(|v| weight[VertexId::new(v)] * columns.dot(v, &multiplier))
+                .collect();
+            let base = problem.base;
+            for (e, d) in direction.as_mut_slice().iter_mut().enumerate() {
+                let [i, j] = base.edge_vertices(EdgeId::new(e));
+                *d += scale[i.index()] + scale[j.index()];
+            }
+        }
+        let change = self.by_edges.times(&direction, missing.len());
+        (direction, change)
+    }
+}
+
+impl Products {
+    fn new(cones: usize, equations: usize) -> Self {
+        let loops = equations - cones;
+        Self {
+            cones,
+            loops,
+            pairs: Vec::new(),
+            values: Vec::new(),
+            diagonal: vec![0.0; equations],
+            among_loops: vec![0.0; loops * loops],
+        }
+    }
+
+    /// Adds Σ w a aᵀ over the columns a.
+    fn add(&mut self, columns: &Columns, weight: &[f64]) {
+        for (c, &w) in weight.iter().enumerate() {
+            let (rows, values) = columns.column(c);
+            for (i, (&r, v)) in rows.iter().zip(values).enumerate() {
+                let v = w * v;
+                self.diagonal[r as usize] += v * values[i];
+                for (&s, u) in rows[..i].iter().zip(values) {
+                    let (r, s) = (r.max(s) as usize, r.min(s) as usize);
+                    if s >= self.cones {
+                        let at = (r - self.cones) * self.loops + (s - self.cones);
+                        self.among_loops[at] += v * u;
+                    } else {
+                        self.pairs.push([s as u32, r as u32]);
+                        self.values.push(v * u);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Lists the products of loops, every pair once.
+    fn list_loops(&mut self) {
+        for i in 0..self.loops {
+            for j in 0..i {
+                self.pairs
+                    .push([(self.cones + j) as u32, (self.cones + i) as u32]);
+                self.values.push(self.among_loops[i * self.loops + j]);
+            }
+        }
+    }
+}
