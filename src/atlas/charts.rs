@@ -16,7 +16,7 @@ use crate::atlas::plane::{RigidMotion, distance, doubled_area, rotate, wrap_angl
 use crate::flow::prescription::Prescription;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{ChartId, FaceId, FaceVec, HalfedgeId, SegmentId, VertexId, VertexVec};
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 /// What a chart covers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -348,7 +348,7 @@ impl ChartMaker<'_> {
                 ]
             })
         };
-        let (motion, residual) = fit(rotation, pairs);
+        let (motion, residual) = fit(snapped(rotation), pairs);
         Gluing { motion, residual }
     }
 }
@@ -410,6 +410,16 @@ fn mean_angle(turns: impl Iterator<Item = (f64, f64)>) -> f64 {
     }
     let correction = if total > 0.0 { sum / total } else { 0.0 };
     wrap_angle(first.unwrap_or(0.0) + correction)
+}
+
+/// Radians within which a gluing's rotation is taken for the multiple of π/2 beside it: ten times what a flow may leave of a cone's curvature.
+const SNAPPED: f64 = 1e-9;
+
+/// The same angle, or the float64 nearest to the multiple of π/2 that it is but for rounding, so that quarter turns are exact.
+fn snapped(rotation: f64) -> f64 {
+    let quarters = [0.0, FRAC_PI_2, -FRAC_PI_2, PI];
+    let near = |quarter: &f64| wrap_angle(rotation - quarter).abs() <= SNAPPED;
+    quarters.into_iter().find(near).unwrap_or(rotation)
 }
 
 /// The translation that fits best after a given rotation, and the largest distance that is left.

@@ -1,6 +1,9 @@
 //! Rigid motions and similarities of the plane.
 
 use crate::geometry::mesh::PLAIN_SQUARES;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+const MINUS_FRAC_PI_2: f64 = -FRAC_PI_2;
 
 /// p ↦ R(rotation) p + translation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -60,15 +63,21 @@ pub fn rotate(p: [f64; 2], angle: f64) -> [f64; 2] {
     rotation(angle)(p)
 }
 
-/// The rotation about the origin by an angle, for many points.
+/// The rotation about the origin by an angle, for many points; exact by the multiples of π/2 in (−π, π].
 pub fn rotation(angle: f64) -> impl Fn([f64; 2]) -> [f64; 2] {
-    let (s, c) = angle.sin_cos();
+    let (s, c) = match angle {
+        0.0 => (0.0, 1.0),
+        FRAC_PI_2 => (1.0, 0.0),
+        MINUS_FRAC_PI_2 => (-1.0, 0.0),
+        PI => (0.0, -1.0),
+        _ => angle.sin_cos(),
+    };
     move |p| [c * p[0] - s * p[1], s * p[0] + c * p[1]]
 }
 
 /// The same angle in (−π, π].
 pub fn wrap_angle(angle: f64) -> f64 {
-    use std::f64::consts::{PI, TAU};
+    use std::f64::consts::TAU;
     let r = angle - TAU * (angle / TAU).round();
     if r <= -PI { r + TAU } else { r }
 }
@@ -91,7 +100,6 @@ pub fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f64::consts::PI;
 
     #[test]
     fn motions_compose_and_invert() {
@@ -106,6 +114,18 @@ mod tests {
         let p = [0.3, -0.8];
         assert!(distance(a.after(&b).apply(p), a.apply(b.apply(p))) < 1e-14);
         assert!(distance(a.inverse().apply(a.apply(p)), p) < 1e-14);
+    }
+
+    #[test]
+    fn quarter_turns_are_exact() {
+        let mut p = [0.1, 0.7];
+        for expected in [[-0.7, 0.1], [-0.1, -0.7], [0.7, -0.1], [0.1, 0.7]] {
+            p = rotate(p, FRAC_PI_2);
+            assert_eq!(p, expected);
+        }
+        assert_eq!(rotate(p, PI), [-0.1, -0.7]);
+        assert_eq!(rotate(p, -FRAC_PI_2), [0.7, -0.1]);
+        assert_eq!(rotate(p, 0.0), p);
     }
 
     #[test]
