@@ -147,7 +147,8 @@ fn check_slit(
         touched[surface.head(h)] = true;
     }
     // Every vertex has a copy for every fan of faces into which the cut divides it.
-    let uncut = |h: usize| cut[h] == 0;
+    // Where two halfedges disagree, the lower one decides, as above.
+    let uncut = |h: usize| cut[surface.twin(h).map_or(h, |t| t.min(h))] == 0;
     let copies = (0..touched.len()).map(|v| match touched[v] {
         true => surface.fans(v, uncut),
         false => surface.fans_of[v] as usize,

@@ -3,7 +3,6 @@
 use super::arrays::Arrays;
 use super::document::Document;
 use super::formulas::{Worst, angle_slack};
-use super::shapes::Shapes;
 use super::surface::Surface;
 use super::{Verdicts, VerifyOptions};
 use std::collections::BTreeMap;
@@ -25,7 +24,7 @@ pub(super) fn check(
     surface: &Surface<'_>,
     arrays: &Arrays,
     document: &Document,
-    shapes: &Shapes,
+    angles: Vec<[f64; 3]>,
     options: &VerifyOptions,
     verdicts: &mut Verdicts,
 ) -> Metric {
@@ -65,7 +64,7 @@ pub(super) fn check(
         .map(|boundary| if *boundary { PI } else { TAU })
         .collect();
     let mut blur = vec![0.0; vertices];
-    let corners = arrays.faces.iter().zip(&shapes.angles);
+    let corners = arrays.faces.iter().zip(angles);
     for ((face, angle), l) in corners.zip(&arrays.flat_length) {
         let face_slack = angle_slack(*l);
         for k in 0..3 {

@@ -314,15 +314,8 @@ pub fn verify_atlas(
     };
     let surface = surface::Surface::new(&arrays);
     surface::check(&surface, &arrays, &document, &mut verdicts);
-    let shapes = shapes::Shapes::new(&arrays);
-    let metric = metric::check(
-        &surface,
-        &arrays,
-        &document,
-        &shapes,
-        options,
-        &mut verdicts,
-    );
+    let (shapes, angles) = shapes::Shapes::new(&arrays);
+    let metric = metric::check(&surface, &arrays, &document, angles, options, &mut verdicts);
     let slit = central::check(&surface, &arrays, &document, options, &mut verdicts);
     transitions::check(&surface, &arrays, &document, &slit, &metric, &mut verdicts);
     charts::check(&surface, &arrays, &document, &slit, &mut verdicts);

@@ -11,8 +11,6 @@ const WELL_SHAPED: f64 = 1e-5;
 
 /// What several checks ask of the faces.
 pub(super) struct Shapes {
-    /// Corner angles in the flat metric.
-    pub angles: Vec<[f64; 3]>,
     /// Areas in space.
     pub source_area: Vec<f64>,
     /// Of the flat areas.
@@ -28,10 +26,11 @@ pub(super) struct Shapes {
 }
 
 impl Shapes {
-    pub fn new(arrays: &Arrays) -> Self {
+    /// Beside the shapes the corner angles in the flat metric, which are large and needed once.
+    pub fn new(arrays: &Arrays) -> (Self, Vec<[f64; 3]>) {
         let faces = arrays.faces.len();
+        let mut angles = Vec::with_capacity(faces);
         let mut shapes = Shapes {
-            angles: Vec::with_capacity(faces),
             source_area: Vec::with_capacity(faces),
             flat_total: 0.0,
             log_scale: Vec::with_capacity(faces),
@@ -60,9 +59,9 @@ impl Shapes {
             shapes.log_scale.push(0.5 * (flat_area / source_area).ln());
             shapes.source_area.push(source_area);
             shapes.is_well.push(is_well);
-            shapes.angles.push(angles_from(halves));
+            angles.push(angles_from(halves));
         }
         shapes.angle_max = [well.0, all.0];
-        shapes
+        (shapes, angles)
     }
 }
