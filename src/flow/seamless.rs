@@ -99,6 +99,7 @@ pub fn seamless(
     observer: &dyn Observer,
 ) -> Result<SeamlessMetric, SeamlessError> {
     check_lengths(delaunay, length)?;
+    loops.check(delaunay)?;
     signature.check(delaunay, loops)?;
     let problem = Problem::new(delaunay, loops, signature);
     let start = length.iter().map(|l| 2.0 * l.ln()).collect();
