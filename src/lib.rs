@@ -61,6 +61,7 @@
 //! * B. Springborn. *Ideal hyperbolic polyhedra and discrete uniformization.* Discrete Comput. Geom. 64, 2020.
 //! * M. Gillespie, N. Sharp, K. Crane. *Integer coordinates for intrinsic geometry processing.* SIGGRAPH Asia 2021.
 //! * M. Campen, R. Capouellez, H. Shen, L. Zhu, D. Panozzo, D. Zorin. *Efficient and robust discrete conformal equivalence with boundary.* SIGGRAPH Asia 2021.
+//! * R. Capouellez, D. Zorin. *Seamless parametrization in Penner coordinates.* ACM Trans. Graph. 43, 2024.
 //! * D. Glickenstein. *Discrete conformal variations and scalar curvature on piecewise flat manifolds.* J. Differential Geom. 87, 2011.
 //! * J. Erickson, K. Whittlesey. *Greedy optimal homotopy and homology generators.* SODA 2005.
 //! * X. Gu, S. Gortler, H. Hoppe. *Geometry images.* SIGGRAPH 2002.

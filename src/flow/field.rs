@@ -87,6 +87,7 @@ impl CrossField {
         loops: &DualLoops,
     ) -> Result<Signature, FieldError> {
         let c = connectivity;
+        loops.check(c)?;
         let mut theta = VertexVec::filled(0.0, c.vertex_count());
         for h in c.halfedges() {
             // From the face of h counterclockwise around its tail across the halfedge before h.

@@ -136,6 +136,13 @@ impl DualLoops {
         Ok(made)
     }
 
+    /// Refuses loops that are not on `connectivity`.
+    pub fn check(&self, connectivity: &Connectivity) -> Result<(), HolonomyError> {
+        let loops = (0..self.len()).map(|of| self.passages(of).collect());
+        let loops: Vec<Vec<Passage>> = loops.collect();
+        Self::new(connectivity, &loops).map(|_| ())
+    }
+
     /// Number of loops.
     pub fn len(&self) -> usize {
         self.first.len()

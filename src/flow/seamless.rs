@@ -7,7 +7,7 @@
 //! Scales alone have no freedom left for the turnings: a conformal class holds one metric with given cones. So the unknowns are the
 //! logarithms of *all* lengths, λ = 2 ln l, on the given triangulation; its Delaunay flips at every λ (Penner coordinates, Ptolemy's theorem) make angles that are
 //! continuously differentiable in all of ℝ^E. Of the solutions of each linear step the shortest is taken, in a norm that weighs
-//! edges by the area of their faces, and changes that scales could make less ([`SeamlessParams::conformality`]).
+//! edges by the size of their faces, and changes that scales could make less ([`SeamlessParams::conformality`]).
 //!
 //! Closed surfaces only.
 
@@ -101,6 +101,7 @@ pub fn seamless(
     observer: &dyn Observer,
 ) -> Result<SeamlessMetric, SeamlessError> {
     check_lengths(delaunay, length)?;
+    loops.check(delaunay)?;
     signature.check(delaunay, loops)?;
     let problem = Problem::new(delaunay, loops, signature);
     let start = length.iter().map(|l| 2.0 * l.ln()).collect();

@@ -1,5 +1,6 @@
 //! Why there is no seamless metric.
 
+use crate::flow::holonomy::HolonomyError;
 use crate::flow::signature::Infeasible;
 use crate::flow::solve::SolveError;
 use crate::geometry::ids::EdgeId;
@@ -31,6 +32,9 @@ pub enum SeamlessError {
         /// Its length.
         length: f64,
     },
+    /// The loops are not on the surface.
+    #[error(transparent)]
+    Loops(#[from] HolonomyError),
     /// No metric has the signature.
     #[error(transparent)]
     Infeasible(#[from] Infeasible),

@@ -2,16 +2,20 @@
 //!
 //! A step of Newton has many solutions; the shortest in this norm is taken. Its inverse is W⁻¹ + τ B V⁻¹ Bᵀ: with d = r + B u, where B
 //! adds the u of both ends of an edge, the square of the length of d is the least of Σ W r² + Σ V u² / τ. W weighs edges by the area of
-//! their faces and V vertices by theirs, each by its mean: without that the change would follow the sampling of the mesh. For
-//! τ = 0 scales are nothing special; as τ grows they become free, and the metric as conformal as the turnings let it.
+//! their faces and V vertices by theirs, each by the square root of area by mean area. For τ = 0 scales are nothing special; as τ grows they become free, and the
+//! metric as conformal as the turnings let it.
+//!
+//! The square root is a compromise. Weights that are all the same make the change follow the sampling of the mesh: where it is fine, there are more edges to keep. Weights that are
+//! the areas do not, but then small faces take most of the change, so angles are far from linear along a step: 12 to 35 steps on a scan of 50,000
+//! vertices, by the choice of cones, against 6 and 7 with equal weights and 8 to 18 with these.
 
 use crate::flow::metric::face_lengths;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, VertexVec};
 use crate::geometry::triangle;
 
-/// Least weight relative to the mean: beyond it, a smaller face is as free as it can matter, and the system would lose digits.
-const LEAST_WEIGHT: f64 = 1e-6;
+/// Least area relative to the mean that counts: the system would lose digits beyond.
+const LEAST_AREA: f64 = 1e-6;
 
 /// Diagonals of the inverse norm.
 #[derive(Clone, Debug)]
@@ -23,7 +27,7 @@ pub(super) struct Norm {
 }
 
 impl Norm {
-    /// Weights by area, for a conformality τ.
+    /// Weights by the square root of area, for a conformality τ.
     pub(super) fn by_area(c: &Connectivity, length: &EdgeVec<f64>, conformality: f64) -> Self {
         let mut edge = EdgeVec::filled(0.0, c.edge_count());
         let mut vertex = VertexVec::filled(0.0, c.vertex_count());
@@ -55,7 +59,7 @@ impl Norm {
 fn inverse(weight: &[f64], factor: f64) -> Vec<f64> {
     let mean = weight.iter().sum::<f64>() / weight.len().max(1) as f64;
     let relative = |w: &f64| match mean > 0.0 {
-        true => (w / mean).max(LEAST_WEIGHT),
+        true => (w / mean).max(LEAST_AREA).sqrt(),
         false => 1.0,
     };
     weight.iter().map(|w| factor / relative(w)).collect()

@@ -91,9 +91,9 @@ impl<'a> Problem<'a> {
         let turning = loops.turning(&c, |corner| shape[c.face(corner)].angle[c.corner(corner)]);
         let turning = self.turning.iter().zip(turning).map(|(to, now)| to - now);
         let turning: Vec<f64> = turning.collect();
-        let angles = theta.iter().copied().chain(turning.iter().copied());
+        let mut angles = theta.iter().copied().chain(turning.iter().copied());
         let largest = angles.clone().fold(0.0, |m: f64, x| m.max(x.abs()));
-        let is_finite = angles.fold(true, |all, x| all && x.is_finite());
+        let is_finite = angles.all(f64::is_finite);
         // Zero but for π in float64 being too small, which comes to 1e-11 on 50,000 vertices and must not gather at the first.
         let mean = theta.iter().sum::<f64>() / theta.len().max(1) as f64;
         let cones = theta.iter().skip(1).map(|x| x - mean);

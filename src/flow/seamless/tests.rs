@@ -394,6 +394,9 @@ fn what_is_no_closed_surface_with_lengths_is_refused() {
         run(&prepared.c, &few),
         SeamlessError::Count { given: 3, .. }
     ));
+    let small = prepare(&shapes::torus(5, 4));
+    let error = run(&small.c, &small.length);
+    assert!(matches!(error, SeamlessError::Loops(_)), "{error}");
     let sheet = shapes::sheet(7, false);
     let error = run(&sheet.connectivity, &sheet.length);
     assert_eq!(error, SeamlessError::NotClosed { boundary_loops: 1 });
