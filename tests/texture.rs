@@ -8,13 +8,20 @@ use libtest_mimic::{Arguments, Failed, Trial};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+/// Quarter turns around every handle.
+const SEAMLESS: &[&str] = &["cones.strategy=field", "flow.holonomy=quarter-turns"];
+
 /// File, settings.
-const MODELS: [(&str, &[&str]); 4] = [
+const MODELS: [(&str, &[&str]); 8] = [
     // Eight cones of π/2.
     ("spot.obj", &["cones.strategy=spread", "cones.count=8"]),
     ("spot.obj", &["cones.count=8", "cones.quantum=1/2"]),
     ("bunny-closed.off", &["cones.count=8", "cones.quantum=1/2"]),
     ("rocker-arm.obj", &["cones.strategy=none"]),
+    ("brezel.obj", SEAMLESS),
+    ("kitten.obj", SEAMLESS),
+    ("fertility.off", SEAMLESS),
+    ("rocker-arm.obj", SEAMLESS),
 ];
 
 fn main() {
@@ -72,7 +79,10 @@ fn seamless(model: &Path, settings: &[&str]) -> Result<(), Failed> {
     let raw = steps(surface, &component.mesh.connectivity, &raw);
     let control = ratio(raw.cut, raw.beside_cut);
     println!("ratios {ratios:?}, as it is {control:.2}");
-    let is_good = ratios.iter().all(|r| (0.9..=1.1).contains(r)) && fitted.largest_misfit <= 1e-9;
+    // The seams of patches may lie where the pattern is stretched otherwise; the cut is compared with what is beside it.
+    let is_good = ratios.iter().all(|r| (0.9..=1.1).contains(r))
+        && (0.97..=1.03).contains(&ratios[2])
+        && fitted.largest_misfit <= 1e-9;
     match is_good && control > 2.0 {
         true => Ok(()),
         false => Err(format!("{ratios:?}, {control}, misfit {:e}", fitted.largest_misfit).into()),
