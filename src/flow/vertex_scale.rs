@@ -89,13 +89,10 @@ mod tests {
     use super::*;
     use crate::flow::ricci::shapes;
 
-    fn sequence(mut state: u64) -> impl FnMut() -> f64 {
-        move || {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-        }
+    /// Numbers in [−½, ½).
+    fn sequence(state: u64) -> impl FnMut() -> f64 {
+        let mut random = shapes::sequence(state);
+        move || random() - 0.5
     }
 
     fn conformal(c: &Connectivity, u: &VertexVec<f64>) -> EdgeVec<f64> {

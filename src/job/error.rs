@@ -130,9 +130,13 @@ impl BuildError {
                 FailureKind::Input
             }
             BuildError::Cones(_) | BuildError::Refine(_) => FailureKind::Prescription,
-            BuildError::Flow(FlowError::Infeasible(_) | FlowError::BadTarget { .. }) => {
-                FailureKind::Prescription
-            }
+            BuildError::Flow(
+                FlowError::Infeasible(_)
+                | FlowError::BadTarget { .. }
+                | FlowError::NoQuarterTurns { .. }
+                | FlowError::QuarterTurnsOnBoundary { .. }
+                | FlowError::QuarterTurnsWithout { .. },
+            ) => FailureKind::Prescription,
             BuildError::Flow(FlowError::GaussBonnet { .. }) => FailureKind::Prescription,
             BuildError::Flow(FlowError::BadLength { .. }) => FailureKind::Input,
             BuildError::Flow(_) | BuildError::Develop(_) => FailureKind::NotConverged,
@@ -180,6 +184,13 @@ fn in_source(error: FlowError, mesh: &Mesh) -> FlowError {
             vertex: vertex(v),
             curvature,
             bound,
+        },
+        FlowError::NoQuarterTurns {
+            vertex: v,
+            curvature,
+        } => FlowError::NoQuarterTurns {
+            vertex: vertex(v),
+            curvature,
         },
         FlowError::Infeasible(violation) => {
             FlowError::Infeasible(refine::in_source(violation, mesh))
