@@ -56,10 +56,13 @@ pub fn prescribe(
     boundary: &BoundaryParams,
 ) -> Result<Prescription, ConeError> {
     let topology = mesh.connectivity.topology();
-    let condition = if topology.boundary_loops == 0 {
-        BoundaryCondition::Free
-    } else {
-        boundary.effective_condition()
+    let condition = match (topology.boundary_loops, cones.strategy) {
+        (0, _) => BoundaryCondition::Free,
+        (_, ConeStrategy::Field) if *boundary == BoundaryParams::default() => {
+            BoundaryCondition::Prescribed
+        }
+        (_, ConeStrategy::Field) => return Err(ConeError::FieldOnGivenBoundary),
+        _ => boundary.effective_condition(),
     };
     let mut target = VertexVec::filled(0.0, mesh.connectivity.vertex_count());
     // By what name each vertex got its curvature.

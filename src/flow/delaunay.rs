@@ -81,6 +81,14 @@ enum Diagonal {
     Euclid,
 }
 
+impl PtolemyFlip {
+    /// Logarithms of lengths after this flip from those before it, or the other way round: Ptolemy's theorem knows no direction.
+    pub fn swap(&self, log_length: &mut EdgeVec<f64>) {
+        let [ca, ad, db, bc] = self.outer.map(|e| log_length[e]);
+        log_length[self.edge] = log_sum(ca + db, ad + bc) - log_length[self.edge];
+    }
+}
+
 impl Delaunay {
     /// Starts with `length` (one an edge, positive and finite) and no flip done.
     pub fn new(
@@ -117,6 +125,19 @@ impl Delaunay {
         let mut shape = FaceVec::default();
         self.update_shapes(&u, &mut shape);
         self.flip_all(&u, &mut shape, Diagonal::Euclid);
+    }
+
+    /// Flips an edge whatever the test says, to the length whose logarithm is given; false where it has no other diagonal.
+    pub fn flip_to(&mut self, e: EdgeId, log_length: f64) -> bool {
+        let Some(flip) = self.connectivity.flip(e) else {
+            return false;
+        };
+        (self.high[e], self.low[e]) = (log_length, 0.0);
+        for correspondence in &mut self.correspondences {
+            correspondence.flipped(&self.connectivity, &flip);
+        }
+        self.flips += 1;
+        true
     }
 
     /// Flips to the Delaunay triangulation at `u` (relative to [`scale`](Self::scale)) by Ptolemy's theorem, and leaves the shapes of all faces in `shape`, whose

@@ -1,6 +1,6 @@
 //! A cross field, and the cones and turnings that it stands for (`docs/method.md`, 8).
 //!
-//! *Enters:* a closed triangulation with its corner angles. *Leaves:* a [`CrossField`]: a direction in every face, up to quarter turns, and by how much
+//! *Enters:* a triangulation with its corner angles. *Leaves:* a [`CrossField`]: a direction in every face, up to quarter turns, and by how much
 //! it turns across every edge; from it a [`Signature`]. *Guaranteed:* signatures are exact multiples of π/2 that meet Gauss–Bonnet; the
 //! same bytes for any number of threads. *Not guaranteed:* the field of least energy among all: it is the smoothest section of the bundle of
 //! fourth powers (Knöppel, Crane, Pinkall, Schröder 2013) divided by its length.
@@ -8,6 +8,9 @@
 //! In the frame of a face halfedge `3f` points along 0. Crossing the halfedge h from face f to face g the frame turns by
 //! ρ_h, and ω_h = φ_g − φ_f − ρ_h, up to quarter turns, is by how much the field turns. Then Θ̂_v = Θ_v − Σ ω over the edges crossed
 //! once counterclockwise around v, and κ̂ = κ − Σ ω along a loop.
+//!
+//! A boundary edge counts as a face beyond it whose frame points along the edge and whose field is that direction: so the field is drawn to the border, and around a
+//! boundary vertex, from border to border, Θ̂ is a multiple of π/2 as well. On the double the field is mirrored, and turns twice as much across the mirror.
 
 mod connection;
 mod quarters;
@@ -17,11 +20,12 @@ mod tests;
 
 pub use smoothest::cross_field;
 
-use crate::flow::holonomy::{DualLoops, HolonomyError};
+use crate::flow::holonomy::HolonomyError;
+use crate::flow::looped::LoopedSurface;
 use crate::flow::signature::Signature;
 use crate::flow::solve::SolveError;
 use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{FaceVec, HalfedgeVec, VertexId, VertexVec};
+use crate::geometry::ids::{FaceVec, HalfedgeId, HalfedgeVec, VertexId, VertexVec};
 use std::f64::consts::FRAC_PI_2;
 
 /// Angles that must be multiples of π/2 are so to this, radians. Rounding leaves about 1e-13.
@@ -32,8 +36,8 @@ const ROUNDING: f64 = 1e-6;
 pub struct CrossField {
     /// φ, radians from halfedge `3f`.
     pub direction: FaceVec<f64>,
-    /// ω: by how much the field turns from the face of a halfedge to that of its twin, radians; the twin's is its negative. Between −π/4 and
-    /// π/4 but where cones were moved.
+    /// ω: by how much the field turns from the face of a halfedge to that of its twin, on the boundary to the direction of the border, radians; the twin's is its
+    /// negative. Between −π/4 and π/4 but where cones were moved.
     pub matching: HalfedgeVec<f64>,
 }
 
@@ -79,28 +83,53 @@ pub enum FieldError {
 }
 
 impl CrossField {
-    /// Cone angles and turnings. `angle`: corner angles, radians, of the triangulation that the field is on.
-    pub fn signature(
+    /// Θ̂ of every vertex, quarter turns: 4 where the field is regular inside, 2 where it is on the boundary. `angle`: corner angles, radians, of the triangulation
+    /// that the field is on.
+    pub fn cones(
         &self,
         connectivity: &Connectivity,
         angle: &FaceVec<[f64; 3]>,
-        loops: &DualLoops,
-    ) -> Result<Signature, FieldError> {
+    ) -> Result<VertexVec<i64>, FieldError> {
         let c = connectivity;
-        loops.check(c)?;
         let mut theta = VertexVec::filled(0.0, c.vertex_count());
         for h in c.halfedges() {
             // From the face of h counterclockwise around its tail across the halfedge before h.
             theta[c.tail(h)] += angle[c.face(h)][c.corner(h)] - self.matching[c.prev(h)];
+            if c.twin(h).is_none() {
+                theta[c.tail(h)] += self.matching[h];
+            }
         }
         let mut cone = VertexVec::filled(0, c.vertex_count());
         for (vertex, &theta) in theta.enumerate() {
             cone[vertex] =
                 quarters(theta).map_err(|residual| FieldError::BrokenCone { vertex, residual })?;
         }
-        let mut turning = loops.turning(c, |corner| angle[c.face(corner)][c.corner(corner)]);
+        Ok(cone)
+    }
+
+    /// Cone angles and turnings on the closed surface or on the double. `angle`: corner angles of the surface's own part, radians.
+    pub fn signature(
+        &self,
+        surface: &LoopedSurface,
+        angle: &FaceVec<[f64; 3]>,
+    ) -> Result<Signature, FieldError> {
+        let (c, loops) = (surface.connectivity, &surface.loops);
+        loops.check(c)?;
+        let own = self.cones(surface.own(), angle)?;
+        let cone = match surface.reflection() {
+            Some(reflection) => c
+                .vertices()
+                .map(|v| match v == reflection.vertex[v] {
+                    true => 2 * own[v],
+                    false => own[v.min(reflection.vertex[v])],
+                })
+                .collect(),
+            None => own,
+        };
+        let mut turning = loops.turning(c, |corner| self.angle_at(surface, angle, corner));
         for (of, turning) in turning.iter_mut().enumerate() {
-            let crossed = loops.passages(of).map(|way| self.matching[way.leave]);
+            let crossed = loops.passages(of);
+            let crossed = crossed.map(|way| self.matching_at(surface, way.leave));
             *turning -= crossed.sum::<f64>();
         }
         let turning = turning.into_iter().enumerate();
@@ -111,6 +140,36 @@ impl CrossField {
             cone,
             turning: turning.collect::<Result<_, _>>()?,
         })
+    }
+
+    /// The angle of a corner of the closed surface or the double.
+    fn angle_at(
+        &self,
+        surface: &LoopedSurface,
+        angle: &FaceVec<[f64; 3]>,
+        corner: HalfedgeId,
+    ) -> f64 {
+        let c = surface.connectivity;
+        let own = match surface.reflection() {
+            // The image of the halfedge that leaves a corner ends at the image of the corner.
+            Some(r) if corner.index() >= self.matching.len() => c.next(r.halfedge[corner]),
+            _ => corner,
+        };
+        angle[c.face(own)][c.corner(own)]
+    }
+
+    /// ω of a halfedge of the closed surface or the double.
+    fn matching_at(&self, surface: &LoopedSurface, h: HalfedgeId) -> f64 {
+        let Some(reflection) = surface.reflection() else {
+            return self.matching[h];
+        };
+        let image = reflection.halfedge[h];
+        let (own, sign) = match h.index() < self.matching.len() {
+            true => (h, 1.0),
+            false => (image, -1.0),
+        };
+        let is_on_mirror = surface.connectivity.twin(h) == Some(image);
+        sign * self.matching[own] * if is_on_mirror { 2.0 } else { 1.0 }
     }
 }
 

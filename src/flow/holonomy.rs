@@ -21,7 +21,7 @@ mod basis;
 #[cfg(test)]
 mod tests;
 
-pub use basis::homology_basis;
+pub use basis::{homology_basis, mirrored_basis};
 
 use crate::geometry::connectivity::{Connectivity, Flip};
 use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId, NONE};

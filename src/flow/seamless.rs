@@ -9,7 +9,8 @@
 //! continuously differentiable in all of ℝ^E. Of the solutions of each linear step the shortest is taken, in a norm that weighs
 //! edges by the size of their faces, and changes that scales could make less ([`SeamlessParams::conformality`]).
 //!
-//! Closed surfaces only.
+//! A surface with boundary is doubled. Its triangulation need not be Delaunay, only its own mirror image ([`Start`]); the changes are kept symmetric, so every edge and vertex
+//! counts together with its image, and the mirror stays straight.
 
 mod error;
 mod jacobian;
@@ -24,6 +25,7 @@ pub use error::SeamlessError;
 
 use crate::flow::holonomy::DualLoops;
 use crate::flow::metric::total_area;
+use crate::flow::mirror::Reflection;
 use crate::flow::signature::Signature;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::EdgeVec;
@@ -31,6 +33,19 @@ use crate::observe::Observer;
 use newton::Reuse;
 use norm::Norm;
 use state::Problem;
+
+/// The metric to start from.
+#[derive(Clone, Copy, Debug)]
+pub struct Start<'a> {
+    /// Closed.
+    pub connectivity: &'a Connectivity,
+    /// Length of every edge in the surface, positive: how much its faces weigh.
+    pub length: &'a EdgeVec<f64>,
+    /// ln of the lengths that the surface's Delaunay triangulation has on this one (Penner coordinates); `None` where this is the Delaunay triangulation.
+    pub log_length: Option<&'a EdgeVec<f64>>,
+    /// The reflection of a double.
+    pub reflection: Option<&'a Reflection>,
+}
 
 /// What may be chosen about a seamless metric.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -90,28 +105,35 @@ pub struct SeamlessMetric {
 
 /// The metric with a signature nearest to the given one; see the module docs.
 ///
-/// `delaunay` must be closed, and an intrinsic Delaunay triangulation of `length` (positive, one an edge); `loops` must be on it and generate its
-/// homology.
+/// `loops` must be on the triangulation of `start` and generate its homology; on a double, those of
+/// [`mirrored_basis`](crate::flow::holonomy::mirrored_basis) do. There the signature must be symmetric.
 pub fn seamless(
-    delaunay: &Connectivity,
-    length: &EdgeVec<f64>,
+    start: &Start,
     loops: &DualLoops,
     signature: &Signature,
     params: &SeamlessParams,
     observer: &dyn Observer,
 ) -> Result<SeamlessMetric, SeamlessError> {
-    check_lengths(delaunay, length)?;
-    loops.check(delaunay)?;
-    signature.check(delaunay, loops)?;
-    let problem = Problem::new(delaunay, loops, signature);
-    let start = length.iter().map(|l| 2.0 * l.ln()).collect();
-    let norm = Norm::by_area(delaunay, length, params.conformality);
-    let solution = newton::solve(&problem, start, &norm, Reuse::WhereFast, params, observer)?;
+    let (c, length) = (start.connectivity, start.length);
+    check_lengths(c, length)?;
+    loops.check(c)?;
+    signature.check(c, loops)?;
+    let problem = Problem::new(c, loops, signature, start.reflection);
+    let penner = match start.log_length {
+        Some(log_length) => log_length.iter().map(|l| 2.0 * l).collect(),
+        None => length.iter().map(|l| 2.0 * l.ln()).collect(),
+    };
+    let penner = match start.reflection {
+        Some(reflection) => reflection.symmetric(&penner),
+        None => penner,
+    };
+    let norm = Norm::by_area(c, length, params.conformality).by_images(start.reflection);
+    let solution = newton::solve(&problem, penner, &norm, Reuse::WhereFast, params, observer)?;
     let (mut penner, state) = (solution.penner, solution.state);
     // Flips commute with a common factor.
     let unscaled: EdgeVec<f64> = state.log_length.iter().map(|l| l.exp()).collect();
     let area = [
-        total_area(delaunay, length),
+        total_area(c, length),
         total_area(&state.connectivity, &unscaled),
     ];
     let factor = (area[0] / area[1]).sqrt();

@@ -1,12 +1,16 @@
 //! The intrinsic Delaunay triangulation of a surface's own metric: from A to B (`docs/method.md`, 2, "Flips").
 //!
 //! *Enters:* connectivity A and its lengths. *Leaves:* B with its lengths, and the edges of A on it. The surface stays as it is, so what is computed on B belongs to
-//! the surface and not to its accidental edges. *Guaranteed:* the same B for the same ids and lengths. A surface with boundary is doubled.
+//! the surface and not to its accidental edges. *Guaranteed:* the same B for the same ids and lengths.
+//!
+//! A surface with boundary is doubled. Its own edges are flipped first, those of its mirror image with them: that leads to the symmetric triangulation T, which holds the mirror.
+//! Where a corner opposite the mirror is obtuse, the edge on the mirror is flipped too on the way from T to B, which need not be symmetric.
 
 use crate::flow::correspondence::Correspondence;
-use crate::flow::delaunay::Delaunay;
+use crate::flow::delaunay::{Delaunay, PtolemyFlip};
 use crate::flow::doubled::Doubled;
 use crate::flow::intrinsic::Intrinsic;
+use crate::flow::mirror::copies;
 use crate::geometry::connectivity::{Connectivity, ConnectivityError};
 use crate::geometry::ids::{EdgeVec, VertexId, VertexVec};
 
@@ -27,6 +31,19 @@ pub struct SurfaceDelaunay {
     pub flips: usize,
     /// Edges of A on B.
     pub base_on_delaunay: Correspondence,
+    /// T, where the surface has a boundary.
+    pub symmetric: Option<Box<Symmetric>>,
+}
+
+/// T and the way from there to B.
+#[derive(Clone, Debug)]
+pub struct Symmetric {
+    /// T. Its first faces and vertices are the surface's own.
+    pub connectivity: Connectivity,
+    /// ln of the length of every edge of T, source units.
+    pub log_length: EdgeVec<f64>,
+    /// From T to B.
+    pub flips: Vec<PtolemyFlip>,
 }
 
 impl SurfaceDelaunay {
@@ -43,7 +60,20 @@ impl SurfaceDelaunay {
         } = doubled;
         let identity = Correspondence::identity(&base);
         let mut delaunay = Delaunay::new(base.clone(), &base_length, vec![identity]);
+        let mut symmetric = None;
+        if !surface.is_closed() {
+            flip_both(&mut delaunay, surface, source_length);
+            symmetric = Some(Box::new(Symmetric {
+                connectivity: delaunay.connectivity.clone(),
+                log_length: delaunay.log_lengths(),
+                flips: Vec::new(),
+            }));
+            delaunay.record = Some(Vec::new());
+        }
         delaunay.flip_in_the_surface();
+        if let Some(symmetric) = &mut symmetric {
+            symmetric.flips = delaunay.record.take().unwrap_or_default();
+        }
         Ok(Self {
             base,
             base_length,
@@ -52,6 +82,7 @@ impl SurfaceDelaunay {
             flips: delaunay.flips,
             base_on_delaunay: delaunay.correspondences.swap_remove(0),
             delaunay: delaunay.connectivity,
+            symmetric,
         })
     }
 
@@ -83,8 +114,36 @@ impl SurfaceDelaunay {
         }
     }
 
+    /// ln of the lengths of a metric on B from those on T (Penner coordinates); they are the same where the surface is closed.
+    pub fn on_delaunay(&self, mut on_symmetric: EdgeVec<f64>) -> EdgeVec<f64> {
+        let flips = self.symmetric.iter().flat_map(|s| &s.flips);
+        flips.for_each(|flip| flip.swap(&mut on_symmetric));
+        on_symmetric
+    }
+
+    /// The other way round.
+    pub fn on_symmetric(&self, mut on_delaunay: EdgeVec<f64>) -> EdgeVec<f64> {
+        let flips = self.symmetric.iter().flat_map(|s| &s.flips);
+        flips.rev().for_each(|flip| flip.swap(&mut on_delaunay));
+        on_delaunay
+    }
+
     /// Length of every edge of B, source units.
     pub fn length(&self) -> EdgeVec<f64> {
         self.log_length.iter().map(|l| l.exp()).collect()
+    }
+}
+
+/// Flips `both`, the double of `surface`, to T: the surface's own edges until they are Delaunay, and their mirror images alike.
+fn flip_both(both: &mut Delaunay, surface: &Connectivity, source_length: &EdgeVec<f64>) {
+    let double = both.connectivity.clone();
+    let mut alone = Delaunay::new(surface.clone(), source_length, Vec::new());
+    alone.record = Some(Vec::new());
+    alone.flip_in_the_surface();
+    let log_length = alone.log_lengths();
+    for flip in alone.record.iter().flatten() {
+        for e in copies(surface, &double, surface.halfedge_count(), flip.edge) {
+            both.flip_to(e, log_length[flip.edge]);
+        }
     }
 }

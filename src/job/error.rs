@@ -134,7 +134,7 @@ impl BuildError {
                 FlowError::Infeasible(_)
                 | FlowError::BadTarget { .. }
                 | FlowError::NoQuarterTurns { .. }
-                | FlowError::QuarterTurnsOnBoundary { .. }
+                | FlowError::QuarterTurnsOnFreeBoundary { .. }
                 | FlowError::QuarterTurnsWithout { .. },
             ) => FailureKind::Prescription,
             BuildError::Flow(FlowError::GaussBonnet { .. }) => FailureKind::Prescription,

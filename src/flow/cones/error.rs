@@ -1,7 +1,7 @@
 //! Why a prescription is refused. Vertices are those of the input file, angles are radians.
 
 use crate::flow::field::FieldError;
-use crate::flow::holonomy::HolonomyError;
+use crate::flow::looped::LoopedError;
 use crate::flow::pi_multiple::in_pi;
 use crate::geometry::connectivity::ConnectivityError;
 
@@ -176,14 +176,11 @@ pub enum ConeError {
         /// 2πχ, radians.
         required: f64,
     },
-    /// Cross fields are made on closed surfaces.
+    /// The field decides about the border.
     #[error(
-        "cones.strategy = \"field\" is for closed surfaces, but this one has {boundary_loops} boundary loop{}: close it, or set cones.strategy = \"auto\" with cones.quantum = \"1/2\"", if *.boundary_loops == 1 { "" } else { "s" }
+        "cones.strategy = \"field\" makes borders straight between corners of its own choice, but boundary.condition, totals, list or corners ask for something else: leave them out, or set cones.strategy = \"auto\" with cones.quantum = \"1/2\""
     )]
-    FieldOnBoundary {
-        /// Number of boundary loops.
-        boundary_loops: usize,
-    },
+    FieldOnGivenBoundary,
     /// A face has no angles.
     #[error(
         "cones.strategy = \"field\" needs faces with an area, and the surface has some without: merge their vertices, or set cones.strategy = \"auto\""
@@ -194,7 +191,7 @@ pub enum ConeError {
     Field(#[from] FieldError),
     /// The loops of the surface could not be found.
     #[error(transparent)]
-    Loops(#[from] HolonomyError),
+    Loops(#[from] LoopedError),
     /// The surface could not be flipped or doubled.
     #[error(transparent)]
     Connectivity(#[from] ConnectivityError),

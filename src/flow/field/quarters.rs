@@ -8,7 +8,7 @@
 //! turns, at a sharp tip or by chance, becomes two of three, or one beside one of five takes the turn from there.
 
 use super::{CrossField, FieldError};
-use crate::flow::holonomy::DualLoops;
+use crate::flow::looped::LoopedSurface;
 use crate::flow::signature::{FULL_TURN, Infeasible, Signature};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceVec, HalfedgeId, VertexId, VertexVec};
@@ -16,104 +16,156 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 use std::f64::consts::FRAC_PI_2;
 
+/// Least angle of a corner on the boundary, quarter turns.
+const LEAST_AT_BORDER: i64 = 1;
 /// A cone of more than a full turn is worth a way this many times as long as that to a flat vertex, which would become a cone.
 const CONE_PREFERENCE: f64 = 8.0;
 
+/// One edge of a way between vertices.
+#[derive(Clone, Copy, Debug)]
+struct Step {
+    halfedge: HalfedgeId,
+    /// Whether the way goes as the halfedge does. Along the boundary there is one halfedge only.
+    is_along: bool,
+}
+
+/// What cone angles are to be.
+struct Limits<'a> {
+    c: &'a Connectivity,
+    /// Inside.
+    least: i64,
+}
+
 impl CrossField {
-    /// The signature with at least `least` quarter turns at every vertex, and how many quarter turns were moved for it. Of a torus whose
-    /// signature no metric has, the flat one: no cones, no turning. `length`: of the edges of the field's triangulation, any unit; the other
-    /// arguments as for [`signature`](Self::signature).
+    /// The signature with at least `least` quarter turns at every vertex inside and one at every vertex of the border, and how many quarter turns were moved for
+    /// it. Of a torus whose signature no metric has, the flat one: no cones, no turning. `angle`: corner angles of the surface's own part, radians.
     pub fn grid_signature(
         &mut self,
-        connectivity: &Connectivity,
-        length: &EdgeVec<f64>,
+        surface: &LoopedSurface,
         angle: &FaceVec<[f64; 3]>,
-        loops: &DualLoops,
         least: i64,
     ) -> Result<(Signature, usize), FieldError> {
-        let c = connectivity;
-        let mut signature = self.signature(c, angle, loops)?;
+        let c = surface.own();
+        let length = surface.own_length();
+        let limits = Limits { c, least };
+        let mut cone = self.cones(c, angle)?;
         let mut moved = 0;
         for v in c.vertices() {
-            while signature.cone[v] < least {
-                let way = way_from_donor(c, length, &signature.cone, v, least).ok_or(
-                    FieldError::TooFewVertices {
-                        vertices: c.vertex_count(),
-                        least,
-                    },
-                )?;
-                for &h in &way {
-                    self.matching[h] -= FRAC_PI_2;
-                    if let Some(t) = c.twin(h) {
-                        self.matching[t] += FRAC_PI_2;
-                    }
-                    signature.cone[c.tail(h)] -= 1;
-                    signature.cone[c.head(h)] += 1;
+            while cone[v] < limits.least(v) {
+                let way =
+                    limits
+                        .way_from_donor(&length, &cone, v)
+                        .ok_or(FieldError::TooFewVertices {
+                            vertices: c.vertex_count(),
+                            least,
+                        })?;
+                for step in way {
+                    self.turn(c, step, &mut cone);
                 }
                 moved += 1;
             }
         }
-        if moved > 0 {
-            signature = self.signature(c, angle, loops)?;
-        }
-        let on_torus = signature.check(c, loops);
+        let mut signature = self.signature(surface, angle)?;
+        let on_torus = signature.check(surface.connectivity, &surface.loops);
         if let Err(Infeasible::FlatTorus { .. } | Infeasible::TwoConesOnTorus { .. }) = on_torus {
             signature.cone.as_mut_slice().fill(FULL_TURN);
             signature.turning.fill(0);
         }
         Ok((signature, moved))
     }
+
+    /// Takes a quarter turn from where a step begins and gives it to where it ends.
+    fn turn(&mut self, c: &Connectivity, step: Step, cone: &mut VertexVec<i64>) {
+        let h = step.halfedge;
+        let (turn, by) = match step.is_along {
+            true => (FRAC_PI_2, 1),
+            false => (-FRAC_PI_2, -1),
+        };
+        self.matching[h] -= turn;
+        if let Some(t) = c.twin(h) {
+            self.matching[t] += turn;
+        }
+        cone[c.tail(h)] -= by;
+        cone[c.head(h)] += by;
+    }
 }
 
-/// Halfedges from a vertex that has a quarter turn to spare to `to`, along the shortest way; `None` where no vertex has.
-fn way_from_donor(
-    c: &Connectivity,
-    length: &EdgeVec<f64>,
-    cone: &VertexVec<i64>,
-    to: VertexId,
-    least: i64,
-) -> Option<Vec<HalfedgeId>> {
-    // Distance and the halfedge that leads one vertex nearer, of what was reached.
-    let mut reached: BTreeMap<VertexId, (f64, Option<HalfedgeId>)> = BTreeMap::new();
-    let mut heap = BinaryHeap::new();
-    reached.insert(to, (0.0, None));
-    // Positive numbers are ordered like their bits.
-    heap.push(Reverse((0u64, to)));
-    let mut best: Option<(f64, VertexId)> = None;
-    while let Some(Reverse((bits, v))) = heap.pop() {
-        let distance = f64::from_bits(bits);
-        if reached.get(&v).is_some_and(|r| distance > r.0) {
-            continue;
-        }
-        if best.is_some_and(|(cost, _)| distance >= cost) {
-            break;
-        }
-        if v != to && cone[v] > least {
-            let factor = if cone[v] > FULL_TURN {
-                1.0
-            } else {
-                CONE_PREFERENCE
-            };
-            let cost = factor * distance;
-            if best.is_none_or(|(least, _)| cost < least) {
-                best = Some((cost, v));
-            }
-        }
-        for h in c.outgoing(v) {
-            // The halfedge before comes in from a neighbour, one an edge on a closed surface.
-            let h = c.prev(h);
-            let (from, through) = (c.tail(h), distance + length[c.edge(h)]);
-            if reached.get(&from).is_none_or(|r| through < r.0) {
-                reached.insert(from, (through, Some(h)));
-                heap.push(Reverse((through.to_bits(), from)));
-            }
+impl Limits<'_> {
+    fn least(&self, v: VertexId) -> i64 {
+        match self.c.is_boundary_vertex(v) {
+            true => LEAST_AT_BORDER,
+            false => self.least,
         }
     }
-    let mut v = best?.1;
-    let mut way = Vec::new();
-    while let Some(&(_, Some(h))) = reached.get(&v) {
-        way.push(h);
-        v = c.head(h);
+
+    /// The angle without a cone.
+    fn flat(&self, v: VertexId) -> i64 {
+        match self.c.is_boundary_vertex(v) {
+            true => FULL_TURN / 2,
+            false => FULL_TURN,
+        }
     }
-    Some(way)
+
+    /// The shortest way from a vertex that has a quarter turn to spare to `to`; `None` where no vertex has.
+    fn way_from_donor(
+        &self,
+        length: &EdgeVec<f64>,
+        cone: &VertexVec<i64>,
+        to: VertexId,
+    ) -> Option<Vec<Step>> {
+        let c = self.c;
+        // Distance and the step that leads one vertex nearer, of what was reached.
+        let mut reached: BTreeMap<VertexId, (f64, Option<Step>)> = BTreeMap::new();
+        let mut heap = BinaryHeap::new();
+        reached.insert(to, (0.0, None));
+        // Positive numbers are ordered like their bits.
+        heap.push(Reverse((0u64, to)));
+        let mut best: Option<(f64, VertexId)> = None;
+        while let Some(Reverse((bits, v))) = heap.pop() {
+            let distance = f64::from_bits(bits);
+            if reached.get(&v).is_some_and(|r| distance > r.0) {
+                continue;
+            }
+            if best.is_some_and(|(cost, _)| distance >= cost) {
+                break;
+            }
+            if v != to && cone[v] > self.least(v) {
+                let factor = match cone[v] > self.flat(v) {
+                    true => 1.0,
+                    false => CONE_PREFERENCE,
+                };
+                let cost = factor * distance;
+                if best.is_none_or(|(least, _)| cost < least) {
+                    best = Some((cost, v));
+                }
+            }
+            // The halfedge before comes in from a neighbour; on the boundary there is one that only goes out.
+            let coming_in = c.outgoing(v).map(|h| Step {
+                halfedge: c.prev(h),
+                is_along: true,
+            });
+            let going_out = c.outgoing(v).filter(|&h| c.twin(h).is_none());
+            let going_out = going_out.map(|halfedge| Step {
+                halfedge,
+                is_along: false,
+            });
+            for step in coming_in.chain(going_out) {
+                let h = step.halfedge;
+                let through = distance + length[c.edge(h)];
+                let from = if step.is_along { c.tail(h) } else { c.head(h) };
+                if reached.get(&from).is_none_or(|r| through < r.0) {
+                    reached.insert(from, (through, Some(step)));
+                    heap.push(Reverse((through.to_bits(), from)));
+                }
+            }
+        }
+        let mut v = best?.1;
+        let mut way = Vec::new();
+        while let Some(&(_, Some(step))) = reached.get(&v) {
+            way.push(step);
+            let h = step.halfedge;
+            v = if step.is_along { c.head(h) } else { c.tail(h) };
+        }
+        Some(way)
+    }
 }

@@ -1,15 +1,18 @@
-//! The smoothest field: least eigenvector of the connection Laplacian on faces.
+//! The smoothest field: least eigenvector of the connection Laplacian on faces, or what diffuses from the border.
 //!
 //! *Enters:* transport between faces, areas. *Leaves:* one complex number a face whose fourth root is the cross.
 //!
 //! The energy Σ |u_g − e^{4iρ} u_f|² over the edges is that of Dirichlet on a triangulation without obtuse corners, at any density of the
-//! faces: both sides of an edge are about as long as the edge is apart. The constraint Σ A |u|² = 1 has the areas, so that the
+//! faces: both sides of an edge are about as long as the edge is apart. On a closed surface the constraint Σ A |u|² = 1 has the areas, so that the
 //! field does not follow the density either. A Hermitian matrix of n rows is a real symmetric one of 2n, and inverse
 //! iteration needs one factor.
+//!
+//! Where there is a border, boundary edges have terms |u_f − e^{4iφ}|² for their own direction φ. The minimum of all terms fades away from the border, and with it
+//! what it says of the inside. So lengths are made 1 and diffused in turn (Merriman, Bence, Osher 1992; for cross fields Viertel, Osting 2019), each
+//! time by as much as the slowest way to fade does: the energy among fields of length 1 sinks until it settles.
 
 use super::connection::transport;
 use super::{CrossField, FieldError};
-use crate::flow::holonomy::HolonomyError;
 use crate::flow::solve::SymmetricSolver;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{FaceId, FaceVec, HalfedgeVec};
@@ -22,20 +25,22 @@ const SHIFT: f64 = 1e-9;
 const SETTLED: f64 = 1e-2;
 /// Most steps.
 const MOST_STEPS: usize = 40;
+/// Steps of inverse iteration for the slowest way to fade, of which two digits are more than enough.
+const RATE_STEPS: usize = 6;
 
-/// The smoothest cross field of a closed surface. `angle`: corner angles, radians; `area`: any unit.
+/// The smoothest cross field of a surface, drawn to the border where it has one. `angle`: corner angles, radians; `area`: any unit.
 pub fn cross_field(
     connectivity: &Connectivity,
     angle: &FaceVec<[f64; 3]>,
     area: &FaceVec<f64>,
 ) -> Result<CrossField, FieldError> {
     let c = connectivity;
-    if !c.is_closed() {
-        let boundary_loops = c.boundary_loops().len();
-        return Err(HolonomyError::NotClosed { boundary_loops }.into());
-    }
     let rho = transport(c, angle);
-    let root = least_eigenvector(c, &rho, area)?;
+    let energy = Energy::new(c, &rho, area);
+    let root = match c.is_closed() {
+        true => energy.least_eigenvector()?,
+        false => energy.diffused()?,
+    };
     let direction: FaceVec<f64> = c
         .faces()
         .map(|f| 0.25 * root[2 * f.index() + 1].atan2(root[2 * f.index()]))
@@ -43,10 +48,12 @@ pub fn cross_field(
     let mut matching = HalfedgeVec::filled(0.0, c.halfedge_count());
     for e in c.edges() {
         let h = c.edge_halfedge(e);
-        let Some(t) = c.twin(h) else { continue };
-        let turn = direction[c.face(t)] - direction[c.face(h)] - rho[h];
+        let beyond = c.twin(h).map_or(0.0, |t| direction[c.face(t)]);
+        let turn = beyond - direction[c.face(h)] - rho[h];
         matching[h] = turn - (turn / FRAC_PI_2).round() * FRAC_PI_2;
-        matching[t] = -matching[h];
+        if let Some(t) = c.twin(h) {
+            matching[t] = -matching[h];
+        }
     }
     Ok(CrossField {
         direction,
@@ -54,64 +61,175 @@ pub fn cross_field(
     })
 }
 
-/// Real and imaginary part of every face's value.
-fn least_eigenvector(
-    c: &Connectivity,
-    rho: &HalfedgeVec<f64>,
-    area: &FaceVec<f64>,
-) -> Result<Vec<f64>, FieldError> {
-    let faces = c.face_count();
-    let parts = |f: FaceId| [2 * f.index() as u32, 2 * f.index() as u32 + 1];
-    let mut diagonal = vec![SHIFT; 2 * faces];
-    let (mut pairs, mut values) = (Vec::new(), Vec::new());
-    for f in c.faces() {
-        // The blocks on the diagonal are diagonal, but filled soon.
-        pairs.push(parts(f));
-        values.push(0.0);
-    }
-    for e in c.edges() {
-        let h = c.edge_halfedge(e);
-        let Some(t) = c.twin(h) else { continue };
-        let ([x, y], [u, v]) = (parts(c.face(h)), parts(c.face(t)));
-        let (sine, cosine) = (4.0 * rho[h]).sin_cos();
-        if x == u {
-            // A face glued to itself: |u − e^{4iρ} u|².
-            for part in [x, y] {
-                diagonal[part as usize] += 2.0 - 2.0 * cosine;
+/// ½ xᵀ A x − bᵀ x: half the energy but for a constant; two parts a face, real and imaginary.
+struct Energy {
+    diagonal: Vec<f64>,
+    pairs: Vec<[u32; 2]>,
+    /// Entries of A, in the order of `pairs`.
+    values: Vec<f64>,
+    /// b: what the border asks for.
+    load: Vec<f64>,
+    /// Number of edges on the border.
+    borders: usize,
+    /// Areas relative to their mean, one a part.
+    mass: Vec<f64>,
+}
+
+impl Energy {
+    fn new(c: &Connectivity, rho: &HalfedgeVec<f64>, area: &FaceVec<f64>) -> Self {
+        let faces = c.face_count();
+        let parts = |f: FaceId| [2 * f.index() as u32, 2 * f.index() as u32 + 1];
+        let mut diagonal = vec![SHIFT; 2 * faces];
+        let mut load = vec![0.0; 2 * faces];
+        let (mut pairs, mut values) = (Vec::new(), Vec::new());
+        for f in c.faces() {
+            // The blocks on the diagonal are diagonal, but filled soon.
+            pairs.push(parts(f));
+            values.push(0.0);
+        }
+        for e in c.edges() {
+            let h = c.edge_halfedge(e);
+            let [x, y] = parts(c.face(h));
+            let (sine, cosine) = (4.0 * rho[h]).sin_cos();
+            let Some(t) = c.twin(h) else {
+                // The border's direction is −ρ in the frame of the face.
+                for (part, wanted) in [(x, cosine), (y, -sine)] {
+                    diagonal[part as usize] += 1.0;
+                    load[part as usize] += wanted;
+                }
+                continue;
+            };
+            let [u, v] = parts(c.face(t));
+            if x == u {
+                // A face glued to itself: |u − e^{4iρ} u|².
+                for part in [x, y] {
+                    diagonal[part as usize] += 2.0 - 2.0 * cosine;
+                }
+                continue;
             }
-            continue;
+            for part in [x, y, u, v] {
+                diagonal[part as usize] += 1.0;
+            }
+            pairs.extend([[u, x], [u, y], [v, x], [v, y]]);
+            values.extend([-cosine, sine, -sine, -cosine]);
         }
-        for part in [x, y, u, v] {
-            diagonal[part as usize] += 1.0;
+        let total: f64 = area.iter().sum();
+        let relative = area.iter().map(|a| a * faces as f64 / total);
+        let borders = c.edges().filter(|&e| c.is_boundary_edge(e)).count();
+        Self {
+            borders,
+            diagonal,
+            pairs,
+            values,
+            load,
+            mass: relative.flat_map(|m| [m, m]).collect(),
         }
-        pairs.extend([[u, x], [u, y], [v, x], [v, y]]);
-        values.extend([-cosine, sine, -sine, -cosine]);
     }
-    let mut solver = SymmetricSolver::with_blocks(2 * faces, 2, &pairs)?;
-    solver.factorize(&diagonal, &values)?;
-    let total: f64 = area.iter().sum();
-    let mass = |part: usize| area[FaceId::new(part / 2)] * faces as f64 / total;
-    let mut x = start(2 * faces);
-    let mut energy = f64::INFINITY;
-    for _ in 0..MOST_STEPS {
-        let load: Vec<f64> = (0..x.len()).map(|i| mass(i) * x[i]).collect();
+
+    fn solver(&self) -> Result<SymmetricSolver, FieldError> {
+        let mut solver = SymmetricSolver::with_blocks(self.diagonal.len(), 2, &self.pairs)?;
+        solver.factorize(&self.diagonal, &self.values)?;
+        Ok(solver)
+    }
+
+    /// M x.
+    fn weighed(&self, x: &[f64]) -> Vec<f64> {
+        x.iter().zip(&self.mass).map(|(x, m)| x * m).collect()
+    }
+
+    /// The next x of inverse iteration, of length 1, and its energy; `None` where it is not finite.
+    fn inverse_step(&self, solver: &mut SymmetricSolver, x: &[f64]) -> Option<(Vec<f64>, f64)> {
+        let load = self.weighed(x);
         let mut next = load.clone();
         solver.solve(&mut next);
-        let norm: f64 = (0..x.len()).map(|i| mass(i) * next[i] * next[i]).sum();
+        let norm = dot(&self.weighed(&next), &next);
         // The matrix times `next` is `load`.
-        let now = next.iter().zip(&load).map(|(a, b)| a * b).sum::<f64>() / norm;
+        let energy = dot(&next, &load) / norm;
         let scale = 1.0 / norm.sqrt();
-        if !(scale.is_finite() && now.is_finite()) {
-            break;
-        }
-        x = next.into_iter().map(|v| v * scale).collect();
-        let is_settled = now > (1.0 - SETTLED) * energy;
-        energy = now;
-        if is_settled {
-            break;
-        }
+        let is_finite = scale.is_finite() && energy.is_finite();
+        is_finite.then(|| (next.into_iter().map(|v| v * scale).collect(), energy))
     }
-    Ok(x)
+
+    /// Of a closed surface.
+    fn least_eigenvector(&self) -> Result<Vec<f64>, FieldError> {
+        let mut solver = self.solver()?;
+        let mut x = start(self.diagonal.len());
+        let mut energy = f64::INFINITY;
+        for _ in 0..MOST_STEPS {
+            let Some((next, now)) = self.inverse_step(&mut solver, &x) else {
+                break;
+            };
+            x = next;
+            let is_settled = now > (1.0 - SETTLED) * energy;
+            energy = now;
+            if is_settled {
+                break;
+            }
+        }
+        Ok(x)
+    }
+
+    /// Of a surface with a border.
+    fn diffused(&self) -> Result<Vec<f64>, FieldError> {
+        let mut solver = self.solver()?;
+        let mut x = self.load.clone();
+        solver.solve(&mut x);
+        let mut slowest = start(self.diagonal.len());
+        let mut rate = 0.0;
+        for _ in 0..RATE_STEPS {
+            if let Some(step) = self.inverse_step(&mut solver, &slowest) {
+                (slowest, rate) = step;
+            }
+        }
+        let parts = self.diagonal.iter().zip(&self.mass);
+        let diagonal: Vec<f64> = parts.map(|(d, m)| d + rate * m).collect();
+        solver.factorize(&diagonal, &self.values)?;
+        let mut best = unit(&x);
+        let mut least = self.of(&best);
+        for _ in 0..MOST_STEPS {
+            let old = self.weighed(&best);
+            let parts = self.load.iter().zip(&old);
+            x = parts.map(|(b, old)| b + rate * old).collect();
+            solver.solve(&mut x);
+            let next = unit(&x);
+            let now = self.of(&next);
+            let is_settled = now > (1.0 - SETTLED) * least;
+            if now < least {
+                (best, least) = (next, now);
+            }
+            if is_settled {
+                break;
+            }
+        }
+        Ok(best)
+    }
+
+    /// The energy of a field.
+    fn of(&self, x: &[f64]) -> f64 {
+        let squares = self.diagonal.iter().zip(x).map(|(d, x)| d * x * x);
+        let pairs = self.pairs.iter().zip(&self.values);
+        let products = pairs.map(|(&[i, j], v)| 2.0 * v * x[i as usize] * x[j as usize]);
+        // Every border asks for a number of length 1.
+        let borders = self.load.iter().zip(x).map(|(b, x)| -2.0 * b * x);
+        let borders = borders.sum::<f64>() + self.borders as f64;
+        squares.sum::<f64>() + products.sum::<f64>() + borders
+    }
+}
+
+/// Every face's number divided by its length.
+fn unit(x: &[f64]) -> Vec<f64> {
+    let of = |part: &[f64]| {
+        let length = part[0].hypot(part[1]);
+        match length > 0.0 {
+            true => [part[0] / length, part[1] / length],
+            false => [1.0, 0.0],
+        }
+    };
+    x.chunks_exact(2).flat_map(of).collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Numbers without pattern, the same every time: hardly orthogonal to any field.

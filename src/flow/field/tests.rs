@@ -1,5 +1,5 @@
 use super::*;
-use crate::flow::holonomy::homology_basis;
+use crate::flow::holonomy::{DualLoops, homology_basis};
 use crate::flow::metric::face_lengths;
 use crate::flow::ricci::shapes::{self, Shape};
 use crate::flow::signature::FULL_TURN;
@@ -12,6 +12,17 @@ struct Fielded {
     angle: FaceVec<[f64; 3]>,
     area: FaceVec<f64>,
     loops: DualLoops,
+}
+
+impl Fielded {
+    fn looped(&self) -> LoopedSurface<'_> {
+        LoopedSurface {
+            connectivity: &self.c,
+            length: self.length.clone(),
+            half: None,
+            loops: self.loops.clone(),
+        }
+    }
 }
 
 fn prepare(shape: &Shape) -> Fielded {
@@ -50,7 +61,7 @@ fn signatures_are_integers_that_meet_gauss_bonnet() {
     for shape in closed() {
         let x = prepare(&shape);
         let field = cross_field(&x.c, &x.angle, &x.area).unwrap();
-        let signature = field.signature(&x.c, &x.angle, &x.loops).unwrap();
+        let signature = field.signature(&x.looped(), &x.angle).unwrap();
         let curvature: i64 = signature.cone.iter().map(|k| FULL_TURN - k).sum();
         let chi = x.c.topology().euler_characteristic;
         assert_eq!(curvature, FULL_TURN * chi, "{}", shape.name);
@@ -79,7 +90,7 @@ fn the_field_of_a_flat_torus_is_parallel() {
     let x = prepare(&shape);
     let field = cross_field(&x.c, &x.angle, &x.area).unwrap();
     assert!(field.matching.iter().all(|w| w.abs() < 1e-6));
-    let signature = field.signature(&x.c, &x.angle, &x.loops).unwrap();
+    let signature = field.signature(&x.looped(), &x.angle).unwrap();
     assert!(signature.cone.iter().all(|&k| k == FULL_TURN));
     assert!(signature.turning.iter().all(|&k| k == 0));
 }
@@ -118,7 +129,7 @@ fn a_broken_matching_is_refused() {
     let field = cross_field(&x.c, &x.angle, &x.area).unwrap();
     let mut broken = field.clone();
     broken.matching[x.c.corner_halfedge(FaceId::new(3), 0)] += 0.1;
-    let error = broken.signature(&x.c, &x.angle, &x.loops).unwrap_err();
+    let error = broken.signature(&x.looped(), &x.angle).unwrap_err();
     assert!(
         matches!(error, FieldError::BrokenCone { residual, .. } if (residual.abs() - 0.1).abs() < 1e-9)
     );
@@ -142,26 +153,18 @@ fn spiky() -> Shape {
 fn sharp_cones_are_given_quarter_turns() {
     let x = prepare(&spiky());
     let mut field = cross_field(&x.c, &x.angle, &x.area).unwrap();
-    let before = field.signature(&x.c, &x.angle, &x.loops).unwrap();
+    let before = field.signature(&x.looped(), &x.angle).unwrap();
     let lacking: i64 = before.cone.iter().map(|k| (3 - k).max(0)).sum();
     assert!(lacking > 0, "the spikes are no sharp cones");
-    let (signature, moved) = field
-        .grid_signature(&x.c, &x.length, &x.angle, &x.loops, 3)
-        .unwrap();
+    let (signature, moved) = field.grid_signature(&x.looped(), &x.angle, 3).unwrap();
     assert_eq!(moved as i64, lacking);
     assert!(signature.cone.iter().all(|&k| k >= 3));
     signature.check(&x.c, &x.loops).unwrap();
     // The changed field is a field still.
-    assert_eq!(
-        field.signature(&x.c, &x.angle, &x.loops).unwrap(),
-        signature
-    );
+    assert_eq!(field.signature(&x.looped(), &x.angle).unwrap(), signature);
     let mut again = cross_field(&x.c, &x.angle, &x.area).unwrap();
     assert_eq!(
-        again
-            .grid_signature(&x.c, &x.length, &x.angle, &x.loops, 3)
-            .unwrap()
-            .0,
+        again.grid_signature(&x.looped(), &x.angle, 3).unwrap().0,
         signature
     );
 }
@@ -177,9 +180,7 @@ fn four_vertices_are_too_few_for_a_grid() {
     let faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]];
     let x = prepare(&Shape::new("tetrahedron", &faces, &positions));
     let mut field = cross_field(&x.c, &x.angle, &x.area).unwrap();
-    let error = field
-        .grid_signature(&x.c, &x.length, &x.angle, &x.loops, 3)
-        .unwrap_err();
+    let error = field.grid_signature(&x.looped(), &x.angle, 3).unwrap_err();
     assert_eq!(
         error,
         FieldError::TooFewVertices {
@@ -187,9 +188,5 @@ fn four_vertices_are_too_few_for_a_grid() {
             least: 3
         }
     );
-    assert!(
-        field
-            .grid_signature(&x.c, &x.length, &x.angle, &x.loops, 1)
-            .is_ok()
-    );
+    assert!(field.grid_signature(&x.looped(), &x.angle, 1).is_ok());
 }

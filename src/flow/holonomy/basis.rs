@@ -1,7 +1,11 @@
-//! 2g loops that generate the homology of a closed surface.
+//! Loops that generate the homology of a closed surface, or of a double as far as symmetric metrics are concerned.
 //!
-//! *Enters:* connectivity. *Leaves:* [`DualLoops`]. *Guaranteed:* 2g simple loops that generate H₁; the same for the same ids. *Not guaranteed:*
+//! *Enters:* connectivity. *Leaves:* [`DualLoops`]. *Guaranteed:* 2g simple loops that generate H₁ of a closed surface; on the double of a surface of genus g with b
+//! boundary loops, 2g in the front half and b − 1 that go from one boundary to another and back on the other side. The same for the same ids. *Not guaranteed:*
 //! the shortest ones.
+//!
+//! In a symmetric metric the turnings of all loops of the double follow from those and from the angles at vertices: mirror images turn alike, and a loop beside a
+//! boundary turns by what its corners leave.
 //!
 //! Tree and cotree (Eppstein 2003; Erickson, Whittlesey 2005 for the choice): a tree of fewest faces from face 0, then a spanning tree of the
 //! vertices among the edges that the first tree does not cross, of those edges first that would close the longest loops. What is in neither tree closes one
@@ -9,11 +13,12 @@
 //! Jacobian short.
 
 use super::{DualLoops, HolonomyError, Passage};
+use crate::flow::mirror::Reflection;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::disjoint_sets::UnionFind;
 use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, FaceVec, HalfedgeId};
 
-/// Shortest ways from face to face, all ending at face 0.
+/// Shortest ways from face to face, all ending at one, the root.
 struct FaceTree {
     /// The halfedge of a face through which its way to the root leaves; `None` at the root.
     up: FaceVec<Option<HalfedgeId>>,
@@ -30,51 +35,70 @@ pub fn homology_basis(connectivity: &Connectivity) -> Result<DualLoops, Holonomy
         let boundary_loops = c.boundary_loops().len();
         return Err(HolonomyError::NotClosed { boundary_loops });
     }
-    let tree = FaceTree::new(c)?;
-    let mut by_length: Vec<Vec<EdgeId>> = Vec::new();
-    for e in c.edges().filter(|&e| !tree.is_crossed[e]) {
-        let length = sides(c, e).map(|h| tree.depth[c.face(h)] as usize);
-        let length = length[0] + length[1];
-        if by_length.len() <= length {
-            by_length.resize(length + 1, Vec::new());
-        }
-        by_length[length].push(e);
-    }
-    let mut joined = UnionFind::new(c.vertex_count());
-    let mut closing = Vec::new();
-    for &e in by_length.iter().rev().flatten() {
-        let [a, b] = c.edge_vertices(e);
-        if !joined.join(a.index(), b.index()) {
-            closing.push(e);
-        }
-    }
-    closing.sort_unstable();
-    let loops: Vec<Vec<Passage>> = closing.iter().map(|&e| tree.close(c, e)).collect();
-    DualLoops::new(c, &loops)
+    let tree = FaceTree::new(c, FaceId::new(0))?;
+    DualLoops::new(c, &tree.handles(c))
 }
 
-/// Both halfedges of an edge of a closed surface.
+/// The loops of a double of which `half` is the front half: its halfedges are the first ones of `double`.
+pub fn mirrored_basis(
+    half: &Connectivity,
+    double: &Connectivity,
+    reflection: &Reflection,
+) -> Result<DualLoops, HolonomyError> {
+    let boundaries = half.boundary_loops();
+    let Some((first, others)) = boundaries.split_first() else {
+        return homology_basis(double);
+    };
+    // Ways end at a face beside the first boundary.
+    let end = first[0];
+    let tree = FaceTree::new(half, half.face(end))?;
+    let mut loops = tree.handles(half);
+    for boundary in others {
+        let nearest = boundary.iter().min_by_key(|&&h| tree.depth[half.face(h)]);
+        let Some(&start) = nearest else { continue };
+        let mut enter = start;
+        let mut there = Vec::new();
+        loop {
+            let up = tree.up[half.face(enter)];
+            let leave = up.unwrap_or(end);
+            there.push(Passage { enter, leave });
+            let Some(across) = up.and_then(|h| half.twin(h)) else {
+                break;
+            };
+            enter = across;
+        }
+        let image = |h: HalfedgeId| reflection.halfedge[h];
+        let back = there.iter().rev().map(|way| Passage {
+            enter: image(way.leave),
+            leave: image(way.enter),
+        });
+        loops.push(there.iter().copied().chain(back).collect());
+    }
+    DualLoops::new(double, &loops)
+}
+
+/// Both halfedges of an edge that is not on the boundary.
 fn sides(c: &Connectivity, e: EdgeId) -> [HalfedgeId; 2] {
     let h = c.edge_halfedge(e);
     [h, c.twin(h).unwrap_or(h)]
 }
 
 impl FaceTree {
-    fn new(c: &Connectivity) -> Result<Self, HolonomyError> {
+    fn new(c: &Connectivity, root: FaceId) -> Result<Self, HolonomyError> {
         let faces = c.face_count();
         let mut tree = Self {
             up: FaceVec::filled(None, faces),
             depth: FaceVec::filled(0, faces),
             is_crossed: EdgeVec::filled(false, c.edge_count()),
         };
-        let mut reached = vec![FaceId::new(0); faces.min(1)];
+        let mut reached = vec![root; faces.min(1)];
         let mut next = 0;
         while let Some(&f) = reached.get(next) {
             next += 1;
             for h in c.face_halfedges(f) {
                 let Some(t) = c.twin(h) else { continue };
                 let g = c.face(t);
-                if g.index() != 0 && tree.up[g].is_none() {
+                if g != root && tree.up[g].is_none() {
                     tree.up[g] = Some(t);
                     tree.depth[g] = tree.depth[f] + 1;
                     tree.is_crossed[c.edge(h)] = true;
@@ -89,6 +113,37 @@ impl FaceTree {
                 faces,
             }),
         }
+    }
+
+    /// The loops around handles: those that edges close which are neither crossed by the tree nor in a tree of vertices, where every boundary counts as one vertex.
+    fn handles(&self, c: &Connectivity) -> Vec<Vec<Passage>> {
+        let mut joined = UnionFind::new(c.vertex_count());
+        let mut by_length: Vec<Vec<EdgeId>> = Vec::new();
+        for e in c.edges() {
+            if c.is_boundary_edge(e) {
+                let [a, b] = c.edge_vertices(e);
+                joined.join(a.index(), b.index());
+                continue;
+            }
+            if self.is_crossed[e] {
+                continue;
+            }
+            let length = sides(c, e).map(|h| self.depth[c.face(h)] as usize);
+            let length = length[0] + length[1];
+            if by_length.len() <= length {
+                by_length.resize(length + 1, Vec::new());
+            }
+            by_length[length].push(e);
+        }
+        let mut closing = Vec::new();
+        for &e in by_length.iter().rev().flatten() {
+            let [a, b] = c.edge_vertices(e);
+            if !joined.join(a.index(), b.index()) {
+                closing.push(e);
+            }
+        }
+        closing.sort_unstable();
+        closing.iter().map(|&e| self.close(c, e)).collect()
     }
 
     /// The loop across `e`: from the face of its halfedge towards the root, and back to the face of the twin.

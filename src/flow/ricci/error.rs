@@ -1,7 +1,7 @@
 //! Why the flow ends without a metric: every variant names what in the input is at fault, and what to change.
 
 use crate::flow::feasibility::Violation;
-use crate::flow::holonomy::HolonomyError;
+use crate::flow::looped::LoopedError;
 use crate::flow::packing::PackingError;
 use crate::flow::pi_multiple::in_pi;
 use crate::flow::schemes::Scheme;
@@ -76,11 +76,11 @@ pub enum FlowError {
         /// Its K̄, radians.
         curvature: f64,
     },
-    /// Quarter turns are prescribed on closed surfaces.
+    /// A free border has no corners that are multiples of π/2.
     #[error(
-        "flow.holonomy = \"quarter-turns\" is for closed surfaces, but this one has {boundary_loops} boundary loop{}: close it, or set flow.holonomy = \"free\"", if *.boundary_loops == 1 { "" } else { "s" }
+        "flow.holonomy = \"quarter-turns\" needs straight borders, but the boundary condition of {boundary_loops} boundary loop{} is \"free\": set cones.strategy = \"field\", which chooses corners, or boundary.condition = \"corners\" or \"prescribed\", or flow.holonomy = \"free\"", if *.boundary_loops == 1 { "" } else { "s" }
     )]
-    QuarterTurnsOnBoundary {
+    QuarterTurnsOnFreeBoundary {
         /// Number of boundary loops.
         boundary_loops: usize,
     },
@@ -97,7 +97,7 @@ pub enum FlowError {
     Seamless(#[from] SeamlessError),
     /// The loops of the surface could not be found.
     #[error(transparent)]
-    Loops(#[from] HolonomyError),
+    Loops(#[from] LoopedError),
     /// The minimum was not reached, or it has broken faces.
     #[error("{}", not_converged_message(*.method, *.iterations, *.max_error, *.tolerance, *.broken, .faces))]
     NotConverged {

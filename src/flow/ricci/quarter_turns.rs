@@ -1,8 +1,9 @@
 //! Metrics whose transitions are quarter turns: cones *and* the turning of every loop are prescribed.
 //!
-//! *Enters:* a closed surface, cones of multiples of π/2. *Leaves:* a [`FlatMetric`] like that of the conformal flow, with the scale that comes nearest to it.
-//! *Guaranteed:* cones and turnings to the tolerance, or an error. *Not guaranteed:* that the metric is conformal: where the surface has handles no
-//! conformal one need exist.
+//! *Enters:* a surface, cones of multiples of π/2; where it has a boundary, prescribed corners there, multiples too. *Leaves:* a [`FlatMetric`] like that of the
+//! conformal flow, with the scale that comes nearest to it.
+//! *Guaranteed:* cones and turnings to the tolerance, or an error; borders are straight between corners, and the turn from one to another is a multiple of π/2.
+//! *Not guaranteed:* that the metric is conformal: where the surface has handles no conformal one need exist.
 //!
 //! Where the cones are those of a cross field, its turnings come with them ([`Prescription::turning`]). Otherwise they are the quarter turns nearest to
 //! what loops turn in the conformal metric with these cones, which is found first: so little is left to change.
@@ -13,15 +14,17 @@ use super::flipping::{self, Surface};
 use super::params::FlowParams;
 use crate::flow::correspondence::Correspondence;
 use crate::flow::delaunay::Delaunay;
-use crate::flow::holonomy::{DualLoops, homology_basis};
-use crate::flow::prescription::Prescription;
+use crate::flow::looped::LoopedSurface;
+use crate::flow::mirror::Reflection;
+use crate::flow::prescription::{BoundaryCondition, Prescription};
 use crate::flow::scale::at_unit_scale;
 use crate::flow::schemes::FaceShape;
-use crate::flow::seamless::{SeamlessParams, SeamlessStep, seamless};
+use crate::flow::seamless::{SeamlessParams, SeamlessStep, Start, seamless};
 use crate::flow::signature::{FULL_TURN, Signature};
 use crate::flow::step::FlowStep;
 use crate::flow::surface_delaunay::SurfaceDelaunay;
 use crate::flow::vertex_scale::nearest_scale;
+use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceVec, VertexId, VertexVec};
 use crate::observe::Observer;
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -37,32 +40,37 @@ pub(super) fn flow(
     observer: &dyn Observer,
 ) -> Result<FlatMetric, FlowError> {
     let c = surface.connectivity;
-    if !c.is_closed() {
+    if !c.is_closed() && prescription.boundary == BoundaryCondition::Free {
         let boundary_loops = c.boundary_loops().len();
-        return Err(FlowError::QuarterTurnsOnBoundary { boundary_loops });
+        return Err(FlowError::QuarterTurnsOnFreeBoundary { boundary_loops });
     }
-    let cone = quarters(&prescription.target)?;
     let ground = SurfaceDelaunay::new(c, surface.source_length)?;
-    let loops = homology_basis(&ground.delaunay)?;
+    let on = LoopedSurface::new(c, &ground)?;
+    let own = quarters(&prescription.target)?;
+    let doubled = |&v: &VertexId| match c.is_boundary_vertex(v) {
+        true => FULL_TURN - 2 * own[v],
+        false => FULL_TURN - own[v],
+    };
+    let cone = ground.original.iter().map(doubled).collect();
+    let log_length = ground.on_symmetric(ground.log_length.clone());
     let turning = match &prescription.turning {
         Some(turning) => turning.clone(),
         None => {
             let prescribed = VertexVec::filled(true, c.vertex_count());
             let target = prescription.target.clone();
             let conformal = flipping::flow(surface, target, prescribed, params, observer)?;
-            let turning = turning_at(&ground, &conformal.log_scale, &loops);
-            turning
-                .iter()
-                .map(|t| (t / FRAC_PI_2).round() as i64)
-                .collect()
+            nearest_turning(&on, &log_length, &conformal)
         }
     };
-    let signature = Signature { cone, turning };
     let found = seamless(
-        &ground.delaunay,
-        &ground.length(),
-        &loops,
-        &signature,
+        &Start {
+            connectivity: on.connectivity,
+            length: &on.length,
+            log_length: Some(&log_length),
+            reflection: on.reflection(),
+        },
+        &on.loops,
+        &Signature { cone, turning },
         &SeamlessParams {
             tolerance: params.curvature_tolerance,
             conformality: params.conformality,
@@ -71,8 +79,9 @@ pub(super) fn flow(
         observer,
     )?;
     let log_length = found.penner.iter().map(|l| 0.5 * l).collect();
+    let log_length = ground.on_delaunay(log_length);
     let history = found.history.iter().map(line).collect();
-    let metric = with_lengths(ground, log_length)?;
+    let metric = with_lengths(c, ground, log_length)?;
     Ok(FlatMetric {
         history,
         max_curvature_error: found.max_error,
@@ -80,15 +89,20 @@ pub(super) fn flow(
     })
 }
 
-/// The metric that B has with other lengths (natural logarithms, Penner coordinates), whose Delaunay triangulation must be flat but for cones; for closed
-/// surfaces. The record of how it was found is empty.
+/// The metric that B has with other lengths (natural logarithms, Penner coordinates), whose Delaunay triangulation must be flat but for cones, and symmetric on a
+/// double. The record of how it was found is empty.
 pub(crate) fn with_lengths(
+    surface: &Connectivity,
     ground: SurfaceDelaunay,
     log_length: EdgeVec<f64>,
 ) -> Result<FlatMetric, FlowError> {
     let parts = log_length.iter().zip(ground.log_length.iter());
     let change: EdgeVec<f64> = parts.map(|(to, from)| to - from).collect();
-    let u = nearest_scale(&ground.delaunay, &change)?;
+    let mut u = nearest_scale(&ground.delaunay, &change)?;
+    if !surface.is_closed() {
+        // Vertices are those of the double as it was made, whatever was flipped.
+        u = Reflection::new(&ground.base, surface.face_count()).mean(&u);
+    }
     let delaunay_penner = at_unit_scale(&ground.delaunay, &log_length, &u);
     let (flat, shape) = flipped(&ground, log_length);
     let c = &flat.connectivity;
@@ -97,18 +111,22 @@ pub(crate) fn with_lengths(
         let corners = c.face_vertices(f).into_iter().zip(shape.angle);
         corners.for_each(|(v, angle)| curvature[v] -= angle);
     }
+    let half = |(v, k): (VertexId, &f64)| match surface.is_boundary_vertex(v) {
+        true => 0.5 * k,
+        false => *k,
+    };
+    let own = surface.vertex_count();
     let log_length = flat.log_lengths();
     let penner = at_unit_scale(c, &log_length, &u);
-    let front_faces = ground.base.face_count();
     Ok(FlatMetric {
-        log_scale: u.clone(),
+        log_scale: u.as_slice()[..own].to_vec().into(),
         length: log_length.iter().map(|l| l.exp()).collect(),
-        curvature,
+        curvature: curvature.enumerate().take(own).map(half).collect(),
         history: Vec::new(),
         max_curvature_error: 0.0,
         fit: None,
         intrinsic: Some(Box::new(ground.leave(
-            front_faces,
+            surface.face_count(),
             flat,
             penner,
             u,
@@ -117,12 +135,12 @@ pub(crate) fn with_lengths(
     })
 }
 
-/// Cone angles in quarter turns.
+/// Curvatures in quarter turns.
 fn quarters(target: &VertexVec<f64>) -> Result<VertexVec<i64>, FlowError> {
     let of = |(vertex, &curvature): (VertexId, &f64)| {
         let turns = (curvature / FRAC_PI_2).round();
         match (curvature - turns * FRAC_PI_2).abs() <= ROUNDING {
-            true => Ok(FULL_TURN - turns as i64),
+            true => Ok(turns as i64),
             false => Err(FlowError::NoQuarterTurns { vertex, curvature }),
         }
     };
@@ -139,15 +157,41 @@ fn flipped(ground: &SurfaceDelaunay, log_length: EdgeVec<f64>) -> (Delaunay, Fac
     (flat, shape)
 }
 
-/// By how much loops on B turn in the metric with the scale `u`, radians.
-fn turning_at(ground: &SurfaceDelaunay, u: &VertexVec<f64>, loops: &DualLoops) -> Vec<f64> {
-    let b = &ground.delaunay;
-    let mut flat = Delaunay::from_logs(b.clone(), ground.log_length.clone(), Vec::new());
+/// By how much loops turn in a conformal metric, to the nearest quarter turn. `log_length`: of the surface's own metric on the triangulation of the loops. A
+/// loop that crosses the mirror does so twice, so it turns by an even number.
+fn nearest_turning(
+    on: &LoopedSurface,
+    log_length: &EdgeVec<f64>,
+    conformal: &FlatMetric,
+) -> Vec<i64> {
+    let u = match &conformal.intrinsic {
+        Some(intrinsic) => &intrinsic.u,
+        None => &conformal.log_scale,
+    };
+    let turned = turning_at(on, log_length, u);
+    let turned = turned.iter().enumerate().map(|(of, turned)| {
+        let crosses = |h| {
+            on.reflection()
+                .is_some_and(|r| on.connectivity.twin(h) == Some(r.halfedge[h]))
+        };
+        let step = match on.loops.passages(of).any(|way| crosses(way.leave)) {
+            true => 2,
+            false => 1,
+        };
+        step * (turned / (FRAC_PI_2 * step as f64)).round() as i64
+    });
+    turned.collect()
+}
+
+/// By how much loops turn in the metric with the scale `u`, radians.
+fn turning_at(on: &LoopedSurface, log_length: &EdgeVec<f64>, u: &VertexVec<f64>) -> Vec<f64> {
+    let base = on.connectivity;
+    let mut flat = Delaunay::from_logs(base.clone(), log_length.clone(), Vec::new());
     flat.record = Some(Vec::new());
     let mut shape = FaceVec::default();
     flat.evaluate(u, &mut shape);
     let c = &flat.connectivity;
-    let mut loops = loops.clone();
+    let mut loops = on.loops.clone();
     for flip in flat.record.iter().flatten() {
         loops.flipped(c, &flip.flip);
     }
@@ -197,7 +241,7 @@ mod tests {
                 l + 0.5 * (x.u[i] + x.u[j])
             };
             let log_length = ground.log_length.enumerate().map(scaled).collect();
-            let found = with_lengths(ground, log_length).unwrap();
+            let found = with_lengths(c, ground, log_length).unwrap();
             let y = found.intrinsic.as_ref().unwrap();
             let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} against {b}");
             x.u.iter().zip(y.u.iter()).for_each(|(a, b)| close(*a, *b));
@@ -235,9 +279,9 @@ mod tests {
         )
         .unwrap();
         assert!(found.max_curvature_error <= 1e-10);
-        let loops = homology_basis(&found.intrinsic.as_ref().unwrap().delaunay).unwrap();
         let ground = SurfaceDelaunay::new(c, length).unwrap();
-        let before = turning_at(&ground, &conformal.log_scale, &loops);
+        let on = LoopedSurface::new(c, &ground).unwrap();
+        let before = turning_at(&on, &ground.log_length, &conformal.log_scale);
         let off = |t: &f64| (t / FRAC_PI_2 - (t / FRAC_PI_2).round()).abs();
         assert!(
             before.iter().any(|t| off(t) > 1e-3),

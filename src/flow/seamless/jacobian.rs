@@ -1,15 +1,16 @@
 //! Derivatives of cone angles and turnings by λ.
 //!
-//! *Enters:* a [`State`]. *Leaves:* sparse matrices by columns: one column an edge of the given triangulation, one row an equation. *Guaranteed:* exact at
+//! *Enters:* a [`State`]. *Leaves:* sparse matrices by columns: one column an edge of the given triangulation, one row an equation. An edge that moves with another
+//! one, its mirror image, adds to that one's column and has an empty one itself. *Guaranteed:* exact at
 //! every λ, also across flips, where the derivative is continuous.
 //!
 //! By the lengths of the Delaunay triangulation, with w_k = ½ cot θ_k, a face has ∂θ_k/∂λ_k = w_i + w_j and ∂θ_k/∂λ_i = −w_j (λ_k opposite corner k). Those lengths
 //! depend on λ by the rows of T: the unit row where an edge was never flipped, else d λ_dc = −d λ_ab + w (d λ_ad + d λ_bc) + (1 − w)(d λ_ca + d λ_db)
 //! one flip after another.
 
-use super::state::{State, equation};
+use super::state::{Problem, State};
 use crate::flow::delaunay::PtolemyFlip;
-use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, NONE};
+use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, Id, IdVec, NONE};
 
 /// A sparse matrix by columns; no row occurs twice in a column.
 #[derive(Clone, Debug, Default)]
@@ -109,20 +110,25 @@ impl Collector {
 
 impl State {
     /// ∂(angles)/∂λ: a column an edge of the given triangulation.
-    pub(super) fn by_edges(&self, equations: usize) -> Columns {
+    pub(super) fn by_edges(&self, problem: &Problem) -> Columns {
         let c = &self.connectivity;
         let edges = c.edge_count();
         let flipped = FlippedRows::new(&self.flips, edges);
         let (first, dependent) = flipped.by_edge(edges);
         let mut columns = Columns::with_capacity(edges, 4 * edges + edges / 2);
-        let mut collector = Collector::new(equations);
+        let mut collector = Collector::new(problem.equations());
+        let images = images(&problem.shares);
         for e in c.edges() {
             let column = e.index();
-            if flipped.number[e] == NONE {
-                self.add_edge(e, 1.0, column, &mut collector);
-            }
-            for &(of, share) in &dependent[first[column] as usize..first[column + 1] as usize] {
-                self.add_edge(of, share, column, &mut collector);
+            let together = [Some(e), images[e]].into_iter().flatten();
+            for part in together.filter(|_| problem.shares[e] == e) {
+                if flipped.number[part] == NONE {
+                    self.add_edge(problem, part, 1.0, column, &mut collector);
+                }
+                let range = first[part.index()] as usize..first[part.index() + 1] as usize;
+                for &(of, share) in &dependent[range] {
+                    self.add_edge(problem, of, share, column, &mut collector);
+                }
             }
             columns.close(&mut collector);
         }
@@ -130,13 +136,16 @@ impl State {
     }
 
     /// ∂(angles)/∂u for a scale u at every vertex: a column a vertex. Scales commute with flips, so T is not needed.
-    pub(super) fn by_scales(&self, equations: usize) -> Columns {
+    pub(super) fn by_scales(&self, problem: &Problem) -> Columns {
         let c = &self.connectivity;
         let vertices = c.vertex_count();
         let mut columns = Columns::with_capacity(vertices, 8 * vertices);
-        let mut collector = Collector::new(equations);
+        let mut collector = Collector::new(problem.equations());
+        let images = images(&problem.vertex_shares);
         for v in c.vertices() {
-            for h in c.outgoing(v) {
+            let together = [Some(v), images[v]].into_iter().flatten();
+            let together = together.filter(|_| problem.vertex_shares[v] == v);
+            for h in together.flat_map(|part| c.outgoing(part)) {
                 let (f, k) = (c.face(h), c.corner(h));
                 let weight = self.shape[f].weight;
                 // ∂θ_i/∂u_k is the weight of the third corner, and angles of a face sum to π.
@@ -144,7 +153,7 @@ impl State {
                     true => -(weight[(k + 1) % 3] + weight[(k + 2) % 3]),
                     false => weight[3 - corner - k],
                 };
-                self.add_corners(f, derivative, v.index(), &mut collector);
+                self.add_corners(problem, f, derivative, v.index(), &mut collector);
             }
             columns.close(&mut collector);
         }
@@ -152,7 +161,14 @@ impl State {
     }
 
     /// `share` times the derivatives by the length of one edge of the Delaunay triangulation.
-    fn add_edge(&self, e: EdgeId, share: f64, column: usize, collector: &mut Collector) {
+    fn add_edge(
+        &self,
+        problem: &Problem,
+        e: EdgeId,
+        share: f64,
+        column: usize,
+        collector: &mut Collector,
+    ) {
         let c = &self.connectivity;
         let h = c.edge_halfedge(e);
         for h in [Some(h), c.twin(h)].into_iter().flatten() {
@@ -162,13 +178,14 @@ impl State {
                 true => share * (weight[(corner + 1) % 3] + weight[(corner + 2) % 3]),
                 false => -share * weight[3 - corner - opposite],
             };
-            self.add_corners(c.face(h), derivative, column, collector);
+            self.add_corners(problem, c.face(h), derivative, column, collector);
         }
     }
 
     /// Adds derivatives of the three angles of a face to the equations that they occur in.
     fn add_corners(
         &self,
+        problem: &Problem,
         f: FaceId,
         derivative: impl Fn(usize) -> f64,
         column: usize,
@@ -176,16 +193,26 @@ impl State {
     ) {
         let c = &self.connectivity;
         for (corner, v) in c.face_vertices(f).into_iter().enumerate() {
-            if let Some(row) = equation(v) {
+            if let Some(row) = problem.equation[v] {
                 collector.add(column, row, derivative(corner));
             }
         }
-        let cones = c.vertex_count() - 1;
         for turn in self.loops.turns_in(c, f) {
-            let row = (cones + turn.of) as u32;
+            let row = (problem.cone_equations + turn.of) as u32;
             collector.add(column, row, turn.sign * derivative(c.corner(turn.corner)));
         }
     }
+}
+
+/// What moves with something else, by that.
+fn images<I: Id>(shares: &IdVec<I, I>) -> IdVec<I, Option<I>> {
+    let mut images = IdVec::filled(None, shares.len());
+    for (id, &with) in shares.enumerate() {
+        if id != with {
+            images[with] = Some(id);
+        }
+    }
+    images
 }
 
 impl FlippedRows {

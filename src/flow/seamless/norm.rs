@@ -10,6 +10,7 @@
 //! vertices, by the choice of cones, against 6 and 7 with equal weights and 8 to 18 with these.
 
 use crate::flow::metric::face_lengths;
+use crate::flow::mirror::Reflection;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, VertexVec};
 use crate::geometry::triangle;
@@ -43,6 +44,24 @@ impl Norm {
             edge: inverse(edge.as_slice(), 1.0).into(),
             vertex: is_conformal.then(|| inverse(vertex.as_slice(), conformality).into()),
         }
+    }
+
+    /// The same where every edge and vertex moves together with its mirror image: both weigh as much as both do, and the entry of one stands for both.
+    pub(super) fn by_images(mut self, reflection: Option<&Reflection>) -> Self {
+        let Some(reflection) = reflection else {
+            return self;
+        };
+        for (e, &image) in reflection.edge.enumerate() {
+            if e != image {
+                self.edge[e] *= 0.5;
+            }
+        }
+        for (v, &image) in reflection.vertex.enumerate() {
+            if let (true, Some(vertex)) = (v != image, &mut self.vertex) {
+                vertex[v] *= 0.5;
+            }
+        }
+        self
     }
 
     /// Every edge and vertex the same.

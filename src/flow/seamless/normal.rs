@@ -42,9 +42,9 @@ impl Normal {
         last: Option<Self>,
     ) -> Result<Self, SolveError> {
         let equations = problem.equations();
-        let by_edges = state.by_edges(equations);
-        let by_scales = norm.vertex.is_some().then(|| state.by_scales(equations));
-        let mut products = Products::new(problem.cone_equations(), equations);
+        let by_edges = state.by_edges(problem);
+        let by_scales = norm.vertex.is_some().then(|| state.by_scales(problem));
+        let mut products = Products::new(problem.cone_equations, equations);
         products.add(&by_edges, norm.edge.as_slice());
         if let (Some(columns), Some(weight)) = (&by_scales, &norm.vertex) {
             products.add(columns, weight.as_slice());
@@ -103,11 +103,14 @@ impl Normal {
                 .collect();
             let base = problem.base;
             for (e, d) in direction.as_mut_slice().iter_mut().enumerate() {
-                let [i, j] = base.edge_vertices(EdgeId::new(e));
-                *d += scale[i.index()] + scale[j.index()];
+                let ends = base.edge_vertices(EdgeId::new(e));
+                let [i, j] = ends.map(|v| problem.vertex_shares[v].index());
+                *d += scale[i] + scale[j];
             }
         }
+        // An image's own column is empty.
         let change = self.by_edges.times(&direction, missing.len());
+        let direction = problem.shares.iter().map(|&e| direction[e]).collect();
         (direction, change)
     }
 }

@@ -5,10 +5,11 @@
 
 use crate::flow::delaunay::{Delaunay, PtolemyFlip};
 use crate::flow::holonomy::DualLoops;
+use crate::flow::mirror::Reflection;
 use crate::flow::schemes::FaceShape;
 use crate::flow::signature::Signature;
 use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{EdgeVec, FaceVec, VertexId, VertexVec};
+use crate::geometry::ids::{EdgeId, EdgeVec, FaceVec, VertexId, VertexVec};
 use std::f64::consts::FRAC_PI_2;
 
 /// What is solved: angles are to reach those of a signature.
@@ -19,6 +20,14 @@ pub(super) struct Problem<'a> {
     theta: VertexVec<f64>,
     /// κ̂, radians.
     turning: Vec<f64>,
+    /// The edge with which an edge moves: itself, or its mirror image where that has the lower id.
+    pub(super) shares: EdgeVec<EdgeId>,
+    /// The same of vertices.
+    pub(super) vertex_shares: VertexVec<VertexId>,
+    /// The number of every vertex's equation: the first has none, since its angle follows from Gauss–Bonnet, and none has one whose mirror image has.
+    pub(super) equation: VertexVec<Option<u32>>,
+    /// Number of equations of cone angles, which come first.
+    pub(super) cone_equations: usize,
 }
 
 /// What an evaluation finds.
@@ -33,17 +42,34 @@ pub(super) struct State {
     pub(super) loops: DualLoops,
     /// From the given triangulation to this one.
     pub(super) flips: Vec<PtolemyFlip>,
-    /// By how much the angles miss, radians: every vertex but the first, whose angle follows from Gauss–Bonnet, then the loops.
+    /// By how much the angles miss, radians: every vertex with an equation, then the loops.
     pub(super) missing: Vec<f64>,
     /// Largest error of an angle, that of the first vertex too, radians; infinite where some angle is no number.
     pub(super) max_error: f64,
 }
 
 impl<'a> Problem<'a> {
-    pub(super) fn new(base: &'a Connectivity, loops: &'a DualLoops, signature: &Signature) -> Self {
+    pub(super) fn new(
+        base: &'a Connectivity,
+        loops: &'a DualLoops,
+        signature: &Signature,
+        reflection: Option<&Reflection>,
+    ) -> Self {
+        let shares = |e: EdgeId| reflection.map_or(e, |r| e.min(r.edge[e]));
+        let vertex_shares = |v: VertexId| reflection.map_or(v, |r| v.min(r.vertex[v]));
+        let mut cone_equations = 0;
+        let equation = base.vertices().map(|v| {
+            let has_one = v.index() > 0 && vertex_shares(v) == v;
+            cone_equations += usize::from(has_one);
+            has_one.then(|| cone_equations as u32 - 1)
+        });
         Self {
             base,
             loops,
+            equation: equation.collect(),
+            cone_equations,
+            shares: base.edges().map(shares).collect(),
+            vertex_shares: base.vertices().map(vertex_shares).collect(),
             theta: signature
                 .cone
                 .iter()
@@ -57,14 +83,9 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Number of equations: one a vertex but the first, one a loop.
+    /// Number of equations.
     pub(super) fn equations(&self) -> usize {
-        self.cone_equations() + self.turning.len()
-    }
-
-    /// Number of equations of cone angles, which come first.
-    pub(super) fn cone_equations(&self) -> usize {
-        self.base.vertex_count().saturating_sub(1)
+        self.cone_equations + self.turning.len()
     }
 
     /// Flips to Delaunay and measures.
@@ -96,7 +117,10 @@ impl<'a> Problem<'a> {
         let is_finite = angles.all(f64::is_finite);
         // Zero but for π in float64 being too small, which comes to 1e-11 on 50,000 vertices and must not gather at the first.
         let mean = theta.iter().sum::<f64>() / theta.len().max(1) as f64;
-        let cones = theta.iter().skip(1).map(|x| x - mean);
+        let cones = theta
+            .enumerate()
+            .filter(|&(v, _)| self.equation[v].is_some());
+        let cones = cones.map(|(_, x)| x - mean);
         let missing = cones.chain(turning.iter().copied()).collect();
         State {
             log_length,
@@ -108,9 +132,4 @@ impl<'a> Problem<'a> {
             connectivity: c,
         }
     }
-}
-
-/// The equation of a vertex; the first has none.
-pub(super) fn equation(v: VertexId) -> Option<u32> {
-    v.raw().checked_sub(1)
 }

@@ -5,6 +5,7 @@ use super::*;
 use crate::flow::delaunay::Delaunay;
 use crate::flow::field::cross_field;
 use crate::flow::holonomy::homology_basis;
+use crate::flow::looped::LoopedSurface;
 use crate::flow::metric::face_lengths;
 use crate::flow::ricci::shapes::{self, Shape};
 use crate::flow::signature::{FULL_TURN, Infeasible};
@@ -41,10 +42,13 @@ fn prepare(shape: &Shape) -> Prepared {
         .collect();
     let loops = homology_basis(&c).unwrap();
     let mut field = cross_field(&c, &angle, &area).unwrap();
-    let signature = field
-        .grid_signature(&c, &length, &angle, &loops, 3)
-        .unwrap()
-        .0;
+    let looped = LoopedSurface {
+        connectivity: &c,
+        length: length.clone(),
+        half: None,
+        loops: loops.clone(),
+    };
+    let signature = field.grid_signature(&looped, &angle, 3).unwrap().0;
     Prepared {
         name: shape.name.clone(),
         c,
@@ -54,9 +58,18 @@ fn prepare(shape: &Shape) -> Prepared {
     }
 }
 
+fn closed<'a>(connectivity: &'a Connectivity, length: &'a EdgeVec<f64>) -> Start<'a> {
+    Start {
+        connectivity,
+        length,
+        log_length: None,
+        reflection: None,
+    }
+}
+
 impl Prepared {
     fn problem(&self) -> Problem<'_> {
-        Problem::new(&self.c, &self.loops, &self.signature)
+        Problem::new(&self.c, &self.loops, &self.signature, None)
     }
 
     fn start(&self) -> EdgeVec<f64> {
@@ -65,8 +78,7 @@ impl Prepared {
 
     fn solve(&self, params: &SeamlessParams) -> Result<SeamlessMetric, SeamlessError> {
         seamless(
-            &self.c,
-            &self.length,
+            &closed(&self.c, &self.length),
             &self.loops,
             &self.signature,
             params,
@@ -125,7 +137,7 @@ fn the_jacobian_agrees_with_finite_differences() {
         let penner = disturbed(&prepared.start(), 0.8, &mut random);
         let state = problem.evaluate(&penner);
         assert!(state.flips.len() > 20);
-        let jacobian = state.by_edges(problem.equations());
+        let jacobian = state.by_edges(&problem);
         for e in (0..penner.len()).step_by(3) {
             let h = 1e-5;
             let mut direction = EdgeVec::filled(0.0, penner.len());
@@ -184,7 +196,7 @@ fn the_jacobian_is_continuous_across_flips() {
         }
         assert_ne!(edges(&low), edges(&high));
         let slopes = [&low, &high].map(|penner| {
-            let jacobian = problem.evaluate(penner).by_edges(problem.equations());
+            let jacobian = problem.evaluate(penner).by_edges(&problem);
             jacobian.times(&direction, problem.equations())
         });
         let h = 1e-6;
@@ -211,7 +223,7 @@ fn derivatives_by_scales_are_sums_of_those_by_lengths() {
     let state = problem.evaluate(&disturbed(&prepared.start(), 0.8, &mut random));
     assert!(state.flips.len() > 20);
     let equations = problem.equations();
-    let (by_edges, by_scales) = (state.by_edges(equations), state.by_scales(equations));
+    let (by_edges, by_scales) = (state.by_edges(&problem), state.by_scales(&problem));
     let u: VertexVec<f64> = prepared.c.vertices().map(|_| random()).collect();
     let ends = |e: EdgeId| prepared.c.edge_vertices(e).map(|v| u[v]);
     let sums: EdgeVec<f64> = prepared
@@ -381,7 +393,14 @@ fn what_is_no_closed_surface_with_lengths_is_refused() {
     let prepared = prepare(&shapes::torus(9, 7));
     let run = |c: &Connectivity, length: &EdgeVec<f64>| {
         let (loops, signature) = (&prepared.loops, &prepared.signature);
-        seamless(c, length, loops, signature, &SeamlessParams::default(), &()).unwrap_err()
+        seamless(
+            &closed(c, length),
+            loops,
+            signature,
+            &SeamlessParams::default(),
+            &(),
+        )
+        .unwrap_err()
     };
     let mut length = prepared.length.clone();
     length[EdgeId::new(5)] = f64::NAN;
