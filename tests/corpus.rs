@@ -61,10 +61,8 @@ fn main() {
             let run = move |corpus: &Path| clean(&corpus.join(file), genus, loops, settings);
             add(format!("{name}/{file}"), Box::new(run));
         }
-        if loops == 0 {
-            let run = move |corpus: &Path| seamless(&corpus.join(file), genus);
-            add(format!("seamless/{file}"), Box::new(run));
-        }
+        let run = move |corpus: &Path| seamless(&corpus.join(file), genus, loops);
+        add(format!("seamless/{file}"), Box::new(run));
     }
     for (file, curvature) in [
         ("brezel.obj", "-4"),
@@ -188,18 +186,19 @@ fn clean(model: &Path, genus: usize, loops: usize, settings: &[&str]) -> Result<
     verify(&atlas, comparable(model), Some(cones))
 }
 
-/// Cones of a cross field, and quarter turns around every handle.
-fn seamless(model: &Path, genus: usize) -> Result<(), Failed> {
+/// Cones of a cross field, quarter turns around every handle, straight borders.
+fn seamless(model: &Path, genus: usize, loops: usize) -> Result<(), Failed> {
     let (_built, atlas, json) = build_one(model, SEAMLESS)?;
     let steps = json["metric"]["iterations"].as_u64();
     let std = json["quality"]["log_scale"]["std"].as_f64();
     let is_good = json["flags"]["seamless"] == true
         && json["topology"]["genus"] == genus
+        && json["topology"]["boundary_loops"] == loops
         && max_error(&json) <= 1e-10
         && steps.is_some_and(|steps| steps <= SEAMLESS_STEPS)
         && std.is_some_and(|std| std <= SEAMLESS_STD);
     let cones = json["cones"].as_array().map_or(0, Vec::len);
-    // A grid has at least three quads around a vertex inside.
+    // A grid has at least three quads around a vertex inside, and one in a corner of the border.
     let curvatures = json["cones"].as_array().into_iter().flatten();
     let has_room = curvatures
         .map(|cone| cone["curvature"].as_f64())

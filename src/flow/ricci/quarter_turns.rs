@@ -214,6 +214,7 @@ fn line(step: &SeamlessStep) -> FlowStep {
 mod tests {
     use super::super::{Holonomy, flow as run, shapes};
     use super::*;
+    use crate::flow::holonomy::homology_basis;
     use std::f64::consts::PI;
 
     fn params(holonomy: Holonomy) -> FlowParams {
@@ -230,9 +231,13 @@ mod tests {
             shapes::plate(0, 2),
             shapes::torus(9, 7),
             shapes::plate(2, 2),
+            shapes::sheet(9, true),
         ] {
             let (c, length) = (&shape.connectivity, &shape.length);
-            let prescription = shape.prescribe_default();
+            let prescription = match c.is_closed() {
+                true => shape.prescribe_default(),
+                false => shape.prescribe_uniform_boundary(),
+            };
             let expected = run(c, length, &prescription, &params(Holonomy::Free), &()).unwrap();
             let x = expected.intrinsic.as_ref().unwrap();
             let ground = SurfaceDelaunay::new(c, length).unwrap();
@@ -289,6 +294,55 @@ mod tests {
         );
     }
 
+    /// Corners that are given, on an annulus: the way from border to border turns by a multiple of π/2 too, which a conformal metric does not make it do.
+    #[test]
+    fn given_corners_make_straight_borders() {
+        let shape = shapes::sheet(9, true);
+        let (c, length) = (&shape.connectivity, &shape.length);
+        let corners = |of: usize, curvature: f64| {
+            let chain = &c.boundary_loops()[of];
+            let tails = (0..4).map(|k| c.tail(chain[k * chain.len() / 4]).index());
+            tails.map(move |v| (v, curvature)).collect::<Vec<_>>()
+        };
+        let cones = [corners(0, 0.5 * PI), corners(1, -0.5 * PI)].concat();
+        let prescription = Prescription {
+            boundary: BoundaryCondition::Prescribed,
+            ..shape.prescribe(&cones)
+        };
+        let found = run(
+            c,
+            length,
+            &prescription,
+            &params(Holonomy::QuarterTurns),
+            &(),
+        )
+        .unwrap();
+        assert!(found.max_curvature_error <= 1e-10);
+        let parts = found.curvature.iter().zip(prescription.target.iter());
+        parts.for_each(|(a, b)| assert!((a - b).abs() < 1e-9, "{a} against {b}"));
+        let ground = SurfaceDelaunay::new(c, length).unwrap();
+        let on = LoopedSurface::new(c, &ground).unwrap();
+        let log_length = ground.on_symmetric(ground.log_length.clone());
+        let free = run(c, length, &prescription, &params(Holonomy::Free), &()).unwrap();
+        let before = turning_at(&on, &log_length, &free.intrinsic.unwrap().u);
+        let off = |t: f64| (t / PI - (t / PI).round()).abs();
+        assert!(before.len() == 1 && off(before[0]) > 1e-4, "{before:?}");
+        let x = found.intrinsic.unwrap();
+        let shape_of = |f| {
+            let sides = crate::flow::metric::face_lengths(&x.flat, &found.length, f);
+            crate::geometry::triangle::angles(sides).unwrap()
+        };
+        let all = homology_basis(&x.flat).unwrap();
+        let angle: FaceVec<[f64; 3]> = x.flat.faces().map(shape_of).collect();
+        let turned = all.turning(&x.flat, |h| angle[x.flat.face(h)][x.flat.corner(h)]);
+        for t in turned {
+            assert!(
+                (t / FRAC_PI_2 - (t / FRAC_PI_2).round()).abs() < 1e-8,
+                "{t}"
+            );
+        }
+    }
+
     #[test]
     fn what_cannot_be_is_refused_in_words() {
         let sphere = shapes::plate(0, 2);
@@ -307,7 +361,10 @@ mod tests {
             "{said}"
         );
         let said = refuse(&shapes::sheet(5, false), &[], &quarter_turns);
-        assert!(said.contains("1 boundary loop:"), "{said}");
+        assert!(
+            said.contains("1 boundary loop is \"free\"") && said.contains("boundary.condition"),
+            "{said}"
+        );
         let gradient = FlowParams {
             solver: super::super::Solver::Gradient,
             ..quarter_turns

@@ -87,6 +87,40 @@ impl Shape {
         self.prescribe(&cones)
     }
 
+    /// Without the faces around some vertices that lie far from each other.
+    pub(crate) fn pierced(&self, holes: usize) -> Shape {
+        let (c, places) = (&self.connectivity, self.spread(holes));
+        let is_kept = |f: &[u32; 3]| f.iter().all(|&v| !places.contains(&(v as usize)));
+        let kept: Vec<[u32; 3]> = c.to_faces().into_iter().filter(is_kept).collect();
+        let mut number = BTreeMap::new();
+        let faces = kept.iter().map(|f| {
+            f.map(|v| {
+                let next = number.len() as u32;
+                *number.entry(v).or_insert(next)
+            })
+        });
+        let faces: Vec<[u32; 3]> = faces.collect();
+        let pierced = Connectivity::from_faces(&faces, number.len()).unwrap();
+        let mut old = vec![0; number.len()];
+        number.iter().for_each(|(&v, &n)| old[n as usize] = v);
+        let between: BTreeMap<[u32; 2], f64> = c
+            .edges()
+            .map(|e| {
+                let [a, b] = c.edge_vertices(e).map(|v| v.raw());
+                ([a.min(b), a.max(b)], self.length[e])
+            })
+            .collect();
+        let length = pierced.edges().map(|e| {
+            let [a, b] = pierced.edge_vertices(e).map(|v| old[v.index()]);
+            between[&[a.min(b), a.max(b)]]
+        });
+        Shape {
+            name: format!("{} with {holes} holes", self.name),
+            length: length.collect(),
+            connectivity: pierced,
+        }
+    }
+
     /// Farthest-point vertices by edge-graph distance.
     pub(crate) fn spread(&self, count: usize) -> Vec<usize> {
         let mut chosen: Vec<usize> = Vec::new();

@@ -14,6 +14,7 @@ use crate::geometry::ids::{EdgeId, FaceId, FaceVec, HalfedgeId, VertexId, Vertex
 use crate::geometry::triangle;
 use std::f64::consts::FRAC_PI_2;
 
+mod borders;
 mod oracle;
 mod signatures;
 
