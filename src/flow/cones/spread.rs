@@ -5,7 +5,6 @@
 
 use crate::geometry::ids::{VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, distance, triangle_area};
-use rustc_hash::FxHashMap;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
@@ -114,34 +113,39 @@ impl PartialEq for Front {
 }
 impl Eq for Front {}
 
-/// The vertices within a distance along the edges of a vertex, nearest first, with their distances; itself left out.
-pub(super) fn around(mesh: &Mesh, source: VertexId, radius: f64) -> Vec<(VertexId, f64)> {
+/// The vertices within a distance along the edges of a vertex, nearest first, with their distances; itself left out. `least`: infinite everywhere, before
+/// and after.
+pub(super) fn around(
+    mesh: &Mesh,
+    source: VertexId,
+    radius: f64,
+    least: &mut VertexVec<f64>,
+) -> Vec<(VertexId, f64)> {
     let mut heap = BinaryHeap::from([Front {
         distance: 0.0,
         vertex: source,
     }]);
-    let mut least: FxHashMap<VertexId, f64> = FxHashMap::default();
-    least.insert(source, 0.0);
+    least[source] = 0.0;
     let mut found = Vec::new();
     while let Some(front) = heap.pop() {
-        if least
-            .get(&front.vertex)
-            .is_some_and(|&d| front.distance > d)
-        {
+        if front.distance > least[front.vertex] {
             continue;
         }
-        if front.vertex != source {
-            found.push((front.vertex, front.distance));
-        }
+        found.push((front.vertex, front.distance));
         for vertex in mesh.connectivity.neighbours(front.vertex) {
             let step = distance(mesh.positions[front.vertex], mesh.positions[vertex]);
             let distance = front.distance + step;
-            if distance <= radius && least.get(&vertex).is_none_or(|&d| distance < d) {
-                least.insert(vertex, distance);
+            if distance <= radius && distance < least[vertex] {
+                least[vertex] = distance;
                 heap.push(Front { distance, vertex });
             }
         }
     }
+    // Whatever was reached was found in the end.
+    for (vertex, _) in &found {
+        least[*vertex] = f64::INFINITY;
+    }
+    found.retain(|(vertex, _)| *vertex != source);
     found
 }
 

@@ -9,7 +9,7 @@
 use super::placement::Placement;
 use super::pool::{Cones, LEAST_GAIN, Pool, Rule};
 use crate::flow::cones::spread;
-use crate::geometry::ids::VertexId;
+use crate::geometry::ids::{VertexId, VertexVec};
 use crate::geometry::mesh::{norm, sub, triangle_area};
 
 /// Outer radii of the rings that cones move on, in square roots of the area.
@@ -43,8 +43,9 @@ impl Placement<'_> {
         let mut places = now.vertices.clone();
         let mut owner: Vec<usize> = (0..count).collect();
         let mut taken: std::collections::BTreeSet<usize> = places.iter().copied().collect();
+        let mut least = VertexVec::filled(f64::INFINITY, self.neighbours.len());
         for (cone, (&v, c)) in now.vertices.iter().zip(&now.curvature).enumerate() {
-            let around = spread::around(self.mesh, VertexId::new(v), radius);
+            let around = spread::around(self.mesh, VertexId::new(v), radius, &mut least);
             // The nearest vertices may be farther away than that.
             let around: Vec<(usize, f64)> = match around.is_empty() {
                 true => {
