@@ -70,8 +70,8 @@ pub fn inner_products(a: &[f64], b: &[f64], counts: [usize; 2]) -> Vec<f64> {
     products
 }
 
-/// The same of as many vectors as others, whose products are known to be a symmetric matrix: half of them are computed.
-pub fn symmetric_products(a: &[f64], b: &[f64], count: usize) -> Vec<f64> {
+/// The same of as many vectors as others, but only those of a vector with the other of the same number and those after that; 0 in the place of others.
+pub fn half_products(a: &[f64], b: &[f64], count: usize) -> Vec<f64> {
     let [a, b] = columns_of(a, b, [count; 2]);
     let mut products = vec![0.0; count * count];
     let into = MatMut::from_column_major_slice_mut(&mut products, count, count);
@@ -86,11 +86,6 @@ pub fn symmetric_products(a: &[f64], b: &[f64], count: usize) -> Vec<f64> {
         1.0,
         Par::Seq,
     );
-    for i in 0..count {
-        for j in 0..i {
-            products[i * count + j] = products[j * count + i];
-        }
-    }
     products
 }
 

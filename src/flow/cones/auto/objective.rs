@@ -11,7 +11,7 @@
 
 use super::star::Star;
 use super::tableau::{Hessian, Limits, Tableau};
-use crate::flow::solve::{inner_products, symmetric_products};
+use crate::flow::solve::{inner_products, half_products};
 
 /// Newton steps at most.
 const STEPS: usize = 40;
@@ -191,7 +191,7 @@ impl Hessian for Products<'_> {
         }
         let fields = &self.answers.field;
         let mut rows = match places.len() == all {
-            true => symmetric_products(&tangents, fields, all),
+            true => half_products(&tangents, fields, all),
             false => inner_products(&tangents, fields, [places.len(), all]),
         };
         let tangents = tangents.chunks(self.by.len().max(1));
@@ -201,6 +201,12 @@ impl Hessian for Products<'_> {
             for (x, ((&own, bent), mean)) in row.iter_mut().zip(others) {
                 let means = a * mean[0] + b * mean[1] + c * mean[2];
                 *x = 4.0 * (*x + bent * tangent[own] - means);
+            }
+        }
+        if places.len() == all {
+            // Half of it is the other half.
+            for i in 0..all {
+                (0..i).for_each(|j| rows[i * all + j] = rows[j * all + i]);
             }
         }
         rows

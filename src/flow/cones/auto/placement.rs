@@ -12,6 +12,7 @@ use super::tableau::Limits;
 use crate::flow::solve::{LANES, Row};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::mesh::Mesh;
+use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Numbers in the columns that are kept.
@@ -28,6 +29,15 @@ struct Known {
     columns: Vec<Row>,
     /// Their sums over the cells of the samples.
     sums: Vec<Row>,
+}
+
+/// Cones whose log scale was asked for.
+#[derive(Default)]
+struct Asked {
+    vertices: Vec<usize>,
+    curvature: Vec<f64>,
+    /// What they add to u in the linear picture.
+    added: Vec<f64>,
 }
 
 /// Cones to be chosen.
@@ -52,6 +62,8 @@ pub(super) struct Placement<'a> {
     pub(super) regions: Samples,
     /// The search comes back to the same places again and again.
     known: Vec<Known>,
+    /// Often the next question is about the same.
+    last: RefCell<Asked>,
     /// Memory of columns that were forgotten.
     spare: Vec<Known>,
 }
@@ -77,13 +89,14 @@ impl<'a> Placement<'a> {
             picture.solve(&mut sunk);
         }
         let connectivity = &mesh.connectivity;
-        let neighbours = Neighbours::new(connectivity);
+        let neighbours = Neighbours::new(mesh);
         let [each, least, most] = SAMPLES;
         let count = (base.len() / each).clamp(least, most);
         Self {
             samples: Samples::new(&neighbours, &allowed, &base, count),
             regions: Samples::none(),
             known: Vec::new(),
+            last: RefCell::default(),
             spare: Vec::new(),
             mesh,
             connectivity,
@@ -133,10 +146,19 @@ impl<'a> Placement<'a> {
 
     /// u of some cones.
     pub(super) fn log_scale_of(&self, vertices: &[usize], curvature: &[f64]) -> Vec<f64> {
-        let mut field = vec![0.0; self.len()];
-        self.add_cones(&mut field, vertices, curvature);
-        self.picture.solve(&mut field);
-        field.iter_mut().zip(&self.base).for_each(|(x, b)| *x += b);
+        let mut last = self.last.borrow_mut();
+        if last.added.is_empty() || last.vertices != vertices || last.curvature != curvature {
+            let mut added = vec![0.0; self.len()];
+            self.add_cones(&mut added, vertices, curvature);
+            self.picture.solve(&mut added);
+            *last = Asked {
+                vertices: vertices.to_vec(),
+                curvature: curvature.to_vec(),
+                added,
+            };
+        }
+        let field = last.added.iter().zip(&self.base);
+        let mut field: Vec<f64> = field.map(|(x, b)| x + b).collect();
         for (&v, c) in vertices.iter().zip(curvature) {
             field[v] += self.picture.star[v].excess(*c);
         }
