@@ -60,17 +60,17 @@ pub fn solve_dense(matrix: &[f64], rhs: &[f64]) -> Option<Vec<f64>> {
     solution.iter().all(|x| x.is_finite()).then_some(solution)
 }
 
-/// The inner products of some vectors with some others, all of one length and one after another in `a` and `b`: for each of the `counts[1]` in `b` those with the
-/// `counts[0]` in `a`. Quickest where those are few.
+/// The inner products of some vectors with some others, all of one length and one after another in `a` and `b`: for each of `counts[0]` in `a` those with the
+/// `counts[1]` in `b`.
 pub fn inner_products(a: &[f64], b: &[f64], counts: [usize; 2]) -> Vec<f64> {
     let [a, b] = columns_of(a, b, counts);
     let mut products = vec![0.0; counts[0] * counts[1]];
-    let into = MatMut::from_column_major_slice_mut(&mut products, counts[0], counts[1]);
-    matmul(into, Accum::Replace, a.transpose(), b, 1.0, Par::Seq);
+    let into = MatMut::from_column_major_slice_mut(&mut products, counts[1], counts[0]);
+    matmul(into, Accum::Replace, b.transpose(), a, 1.0, Par::Seq);
     products
 }
 
-/// The same of as many vectors as others, but for each in `b` only those with the one of its number in `a` and those after that; 0 in the place of others.
+/// The same of as many vectors as others, but only those of a vector with the other of the same number and those after that; 0 in the place of others.
 pub fn half_products(a: &[f64], b: &[f64], count: usize) -> Vec<f64> {
     let [a, b] = columns_of(a, b, [count; 2]);
     let mut products = vec![0.0; count * count];
@@ -79,9 +79,9 @@ pub fn half_products(a: &[f64], b: &[f64], count: usize) -> Vec<f64> {
         into,
         BlockStructure::TriangularLower,
         Accum::Replace,
-        a.transpose(),
+        b.transpose(),
         BlockStructure::Rectangular,
-        b,
+        a,
         BlockStructure::Rectangular,
         1.0,
         Par::Seq,
