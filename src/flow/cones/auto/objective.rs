@@ -15,6 +15,8 @@ use crate::flow::solve::{inner_products, half_products};
 
 /// Newton steps at most.
 const STEPS: usize = 40;
+/// Steps that are made where nearly nothing is left.
+const LAST_STEPS: usize = 3;
 /// Gain of a step, relative to the objective, after which it is the last: of curvatures that stay …
 pub(super) const SETTLED: f64 = 1e-9;
 /// … and of those that are only compared.
@@ -292,6 +294,7 @@ impl Points<'_> {
         let mut curvature = start.to_vec();
         let mut state = self.state(answers, start);
         let mut is_feasible = limits.are_met(start, 1e-9);
+        let mut last_steps = 0;
         for _ in 0..STEPS {
             let mut model = self.model_at(&state, answers, &curvature, limits);
             model.complete();
@@ -300,13 +303,14 @@ impl Points<'_> {
             }
             model.settle();
             let next: Vec<f64> = (0..answers.len()).map(|i| model.curvature(i)).collect();
-            // Where nearly nothing is left, J is rounding, but its derivative is not: the last step is not asked what it gains.
+            // Where nearly nothing is left, J is rounding, but its derivative is not: the last steps are not asked what they gain.
             let is_last = is_feasible && state.value < NOTHING;
             // Where the start keeps neither total nor limits there is nothing to compare with.
             if is_last || !is_feasible {
                 state = self.state(answers, &next);
                 (curvature, is_feasible) = (next, true);
-                if is_last {
+                last_steps += usize::from(is_last);
+                if last_steps == LAST_STEPS {
                     break;
                 }
                 continue;
