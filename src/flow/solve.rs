@@ -15,6 +15,7 @@ pub use columns::{LANES, Row};
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::solvers::Solve;
 use faer::perm::PermRef;
@@ -59,30 +60,40 @@ pub fn solve_dense(matrix: &[f64], rhs: &[f64]) -> Option<Vec<f64>> {
     solution.iter().all(|x| x.is_finite()).then_some(solution)
 }
 
-/// The inner products of `count` vectors of one length, one after another in `columns`: a symmetric matrix of `count` rows.
-pub fn inner_products(columns: &[f64], count: usize) -> Vec<f64> {
-    let length = columns.len() / count.max(1);
-    let a = MatRef::from_column_major_slice(&columns[..count * length], length, count);
+/// The inner products of some vectors with some others, all of one length and one after another in `a` and `b`: for each of `counts[0]` in `a` those with the
+/// `counts[1]` in `b`.
+pub fn inner_products(a: &[f64], b: &[f64], counts: [usize; 2]) -> Vec<f64> {
+    let [a, b] = columns_of(a, b, counts);
+    let mut products = vec![0.0; counts[0] * counts[1]];
+    let into = MatMut::from_column_major_slice_mut(&mut products, counts[1], counts[0]);
+    matmul(into, Accum::Replace, b.transpose(), a, 1.0, Par::Seq);
+    products
+}
+
+/// The same of as many vectors as others, but only those of a vector with the other of the same number and those after that; 0 in the place of others.
+pub fn half_products(a: &[f64], b: &[f64], count: usize) -> Vec<f64> {
+    let [a, b] = columns_of(a, b, [count; 2]);
     let mut products = vec![0.0; count * count];
     let into = MatMut::from_column_major_slice_mut(&mut products, count, count);
-    // Half of them, and then the other half.
     triangular::matmul(
         into,
         BlockStructure::TriangularLower,
         Accum::Replace,
-        a.transpose(),
+        b.transpose(),
         BlockStructure::Rectangular,
         a,
         BlockStructure::Rectangular,
         1.0,
         Par::Seq,
     );
-    for i in 0..count {
-        for j in 0..i {
-            products[i * count + j] = products[j * count + i];
-        }
-    }
     products
+}
+
+fn columns_of<'a>(a: &'a [f64], b: &'a [f64], counts: [usize; 2]) -> [MatRef<'a, f64>; 2] {
+    let length = b.len() / counts[1].max(1);
+    let matrix =
+        |x: &'a [f64], count| MatRef::from_column_major_slice(&x[..count * length], length, count);
+    [matrix(a, counts[0]), matrix(b, counts[1])]
 }
 
 /// A symmetric positive definite matrix with a fixed pattern, and its Cholesky factor.

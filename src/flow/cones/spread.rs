@@ -5,7 +5,6 @@
 
 use crate::geometry::ids::{VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, distance, triangle_area};
-use rustc_hash::FxHashMap;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
@@ -90,9 +89,10 @@ pub(crate) fn by_position(p: [f64; 3], q: [f64; 3]) -> Ordering {
     (0..3).fold(Ordering::Equal, |o, i| o.then(p[i].total_cmp(&q[i])))
 }
 
-struct Front {
-    distance: f64,
-    vertex: VertexId,
+/// A vertex that paths have come to.
+pub(super) struct Front {
+    pub(super) distance: f64,
+    pub(super) vertex: VertexId,
 }
 
 impl Ord for Front {
@@ -113,37 +113,6 @@ impl PartialEq for Front {
     }
 }
 impl Eq for Front {}
-
-/// The vertices within a distance along the edges of a vertex, nearest first, with their distances; itself left out.
-pub(super) fn around(mesh: &Mesh, source: VertexId, radius: f64) -> Vec<(VertexId, f64)> {
-    let mut heap = BinaryHeap::from([Front {
-        distance: 0.0,
-        vertex: source,
-    }]);
-    let mut least: FxHashMap<VertexId, f64> = FxHashMap::default();
-    least.insert(source, 0.0);
-    let mut found = Vec::new();
-    while let Some(front) = heap.pop() {
-        if least
-            .get(&front.vertex)
-            .is_some_and(|&d| front.distance > d)
-        {
-            continue;
-        }
-        if front.vertex != source {
-            found.push((front.vertex, front.distance));
-        }
-        for vertex in mesh.connectivity.neighbours(front.vertex) {
-            let step = distance(mesh.positions[front.vertex], mesh.positions[vertex]);
-            let distance = front.distance + step;
-            if distance <= radius && least.get(&vertex).is_none_or(|&d| distance < d) {
-                least.insert(vertex, distance);
-                heap.push(Front { distance, vertex });
-            }
-        }
-    }
-    found
-}
 
 /// Lowers `nearest` to the distance from the sources along the edges (Dijkstra), wherever that is less.
 pub(super) fn approach(mesh: &Mesh, sources: &[VertexId], nearest: &mut VertexVec<f64>) {

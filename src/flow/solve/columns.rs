@@ -5,7 +5,8 @@
 //! The crate solves supernode by supernode with calls for dense blocks, and on a surface most supernodes have few columns: the calls then cost several
 //! times what they compute. Here [`LANES`] columns lie side by side, so that every entry of the factor meets whole rows of numbers; only
 //! large blocks are left to the crate. A column starts from one unknown, and forward substitution reaches only what is
-//! above that in the elimination tree: supernodes whose rows are all 0 are passed over.
+//! above that in the elimination tree: supernodes whose rows are all 0 are passed over. All of it is compiled for the widest vectors that the
+//! crate knows, and those that the machine has are taken.
 //!
 //! *Guaranteed:* a column has the same bytes whichever others are beside it.
 
@@ -13,6 +14,7 @@ use super::SymmetricSolver;
 use faer::linalg::matmul::matmul;
 use faer::sparse::linalg::cholesky::SymbolicCholeskyRaw;
 use faer::{Accum, MatMut, MatRef, Par};
+use pulp::{Arch, Simd, WithSimd};
 
 /// Columns side by side.
 pub const LANES: usize = 16;
@@ -50,29 +52,15 @@ impl SymmetricSolver {
         for (lane, &at) in positions.iter().enumerate().take(LANES) {
             columns[at as usize][lane] = 1.0;
         }
-        let mut rows = Vec::new();
-        for node in self.supernodes() {
-            let own = columns[node.start..][..node.size].as_flattened();
-            if own.iter().any(|x| *x != 0.0) {
-                node.forward(columns, &mut rows);
-            }
-        }
-        for node in self.supernodes().rev() {
-            node.backward(columns, &mut rows);
-        }
+        Arch::new().dispatch(SideBySide {
+            solver: self,
+            sides: columns,
+        });
     }
 
     /// Replaces one right side, in the order of elimination, by the solution.
     pub fn solve_ordered(&self, side: &mut [f64]) {
-        let mut rows = Vec::new();
-        for node in self.supernodes() {
-            if side[node.start..][..node.size].iter().any(|x| *x != 0.0) {
-                node.forward_one(side, &mut rows);
-            }
-        }
-        for node in self.supernodes().rev() {
-            node.backward_one(side, &mut rows);
-        }
+        Arch::new().dispatch(Alone { solver: self, side });
     }
 
     fn supernodes(&self) -> impl DoubleEndedIterator<Item = Supernode<'_>> {
@@ -108,12 +96,62 @@ impl SymmetricSolver {
     }
 }
 
+/// Several right sides to be replaced by the solutions.
+struct SideBySide<'a> {
+    solver: &'a SymmetricSolver,
+    sides: &'a mut [Row],
+}
+
+impl WithSimd for SideBySide<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let mut rows = Vec::new();
+        for node in self.solver.supernodes() {
+            let own = self.sides[node.start..][..node.size].as_flattened();
+            if own.iter().any(|x| *x != 0.0) {
+                node.forward::<S>(self.sides, &mut rows);
+            }
+        }
+        for node in self.solver.supernodes().rev() {
+            node.backward::<S>(self.sides, &mut rows);
+        }
+    }
+}
+
+/// One right side.
+struct Alone<'a> {
+    solver: &'a SymmetricSolver,
+    side: &'a mut [f64],
+}
+
+impl WithSimd for Alone<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let mut rows = Vec::new();
+        for node in self.solver.supernodes() {
+            let own = &self.side[node.start..][..node.size];
+            if own.iter().any(|x| *x != 0.0) {
+                node.forward_one::<S>(self.side, &mut rows);
+            }
+        }
+        for node in self.solver.supernodes().rev() {
+            node.backward_one::<S>(self.side, &mut rows);
+        }
+    }
+}
+
 impl Supernode<'_> {
+    #[inline(always)]
     fn height(&self) -> usize {
         self.size + self.below.len()
     }
 
     /// A column of the diagonal block from the diagonal on, and below the block.
+    #[inline(always)]
     fn column(&self, j: usize) -> (&[f64], &[f64]) {
         let (top, bottom) = self.value[j * self.height()..][..self.height()].split_at(self.size);
         (&top[j..], bottom)
@@ -134,7 +172,8 @@ impl Supernode<'_> {
         )
     }
 
-    fn forward(&self, x: &mut [Row], rows: &mut Vec<Row>) {
+    #[inline(always)]
+    fn forward<S: Simd>(&self, x: &mut [Row], rows: &mut Vec<Row>) {
         let is_large = self.is_large();
         for j in 0..self.size {
             let (top, bottom) = self.column(j);
@@ -143,11 +182,11 @@ impl Supernode<'_> {
             own.iter_mut().for_each(|x| *x /= top[0]);
             let own = *own;
             for (l, row) in top[1..].iter().zip(after.iter_mut()) {
-                subtract(row, *l, &own);
+                subtract::<S>(row, *l, &own);
             }
             if !is_large {
                 for (l, &r) in bottom.iter().zip(self.below) {
-                    subtract(&mut after[r as usize - self.start - j - 1], *l, &own);
+                    subtract::<S>(&mut after[r as usize - self.start - j - 1], *l, &own);
                 }
             }
         }
@@ -160,12 +199,13 @@ impl Supernode<'_> {
             let sum = MatMut::from_row_major_slice_mut(sum, self.below.len(), LANES);
             matmul(sum, Accum::Replace, self.bottom(), own, 1.0, Par::Seq);
             for (row, &r) in rows.iter().zip(self.below) {
-                subtract(&mut x[r as usize], 1.0, row);
+                subtract::<S>(&mut x[r as usize], 1.0, row);
             }
         }
     }
 
-    fn backward(&self, x: &mut [Row], rows: &mut Vec<Row>) {
+    #[inline(always)]
+    fn backward<S: Simd>(&self, x: &mut [Row], rows: &mut Vec<Row>) {
         let is_large = self.is_large();
         if is_large {
             rows.clear();
@@ -182,11 +222,11 @@ impl Supernode<'_> {
             let at = self.start + j;
             let mut own = x[at];
             for (l, row) in top[1..].iter().zip(&x[at + 1..]) {
-                subtract(&mut own, *l, row);
+                subtract::<S>(&mut own, *l, row);
             }
             if !is_large {
                 for (l, &r) in bottom.iter().zip(self.below) {
-                    subtract(&mut own, *l, &x[r as usize]);
+                    subtract::<S>(&mut own, *l, &x[r as usize]);
                 }
             }
             own.iter_mut().for_each(|x| *x /= top[0]);
@@ -194,7 +234,8 @@ impl Supernode<'_> {
         }
     }
 
-    fn forward_one(&self, x: &mut [f64], rows: &mut Vec<f64>) {
+    #[inline(always)]
+    fn forward_one<S: Simd>(&self, x: &mut [f64], rows: &mut Vec<f64>) {
         rows.clear();
         rows.resize(self.below.len(), 0.0);
         for j in 0..self.size {
@@ -203,10 +244,10 @@ impl Supernode<'_> {
             x[at] /= top[0];
             let own = x[at];
             for (l, x) in top[1..].iter().zip(&mut x[at + 1..]) {
-                *x -= l * own;
+                *x = multiply_add::<S>(-l, own, *x);
             }
             for (l, row) in bottom.iter().zip(rows.iter_mut()) {
-                *row += l * own;
+                *row = multiply_add::<S>(*l, own, *row);
             }
         }
         for (row, &r) in rows.iter().zip(self.below) {
@@ -214,29 +255,39 @@ impl Supernode<'_> {
         }
     }
 
-    fn backward_one(&self, x: &mut [f64], rows: &mut Vec<f64>) {
+    #[inline(always)]
+    fn backward_one<S: Simd>(&self, x: &mut [f64], rows: &mut Vec<f64>) {
         rows.clear();
         rows.extend(self.below.iter().map(|&r| x[r as usize]));
         for j in (0..self.size).rev() {
             let (top, bottom) = self.column(j);
             let at = self.start + j;
-            let own = x[at] - dot(&top[1..], &x[at + 1..]) - dot(bottom, rows);
+            let own = x[at] - dot::<S>(&top[1..], &x[at + 1..]) - dot::<S>(bottom, rows);
             x[at] = own / top[0];
         }
     }
 }
 
+/// `x` + `a` `b`, rounded once where that is quick.
+#[inline(always)]
+fn multiply_add<S: Simd>(a: f64, b: f64, x: f64) -> f64 {
+    match S::IS_SCALAR {
+        true => x + a * b,
+        false => a.mul_add(b, x),
+    }
+}
+
 /// `row` − `factor` · `other`.
-#[inline]
-fn subtract(row: &mut Row, factor: f64, other: &Row) {
+#[inline(always)]
+fn subtract<S: Simd>(row: &mut Row, factor: f64, other: &Row) {
     for (x, y) in row.iter_mut().zip(other) {
-        *x -= factor * y;
+        *x = multiply_add::<S>(-factor, *y, *x);
     }
 }
 
 /// Σ a b, as far as the shorter goes, in a fixed order.
-#[inline]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+#[inline(always)]
+fn dot<S: Simd>(a: &[f64], b: &[f64]) -> f64 {
     let length = a.len().min(b.len());
     // Four sums side by side are quicker than one.
     let mut sums = [0.0; 4];
@@ -244,7 +295,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (whole_b, rest_b) = b[..length].as_chunks::<4>();
     for (a, b) in whole_a.iter().zip(whole_b) {
         for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
-            *sum += a * b;
+            *sum = multiply_add::<S>(*a, *b, *sum);
         }
     }
     let rest: f64 = rest_a.iter().zip(rest_b).map(|(a, b)| a * b).sum();

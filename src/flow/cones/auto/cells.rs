@@ -17,8 +17,12 @@ const STEEPEST: f64 = 300.0;
 pub(super) struct Cells<'a> {
     /// Cell of every vertex.
     cell: Vec<u32>,
-    /// Cell and area of the vertices whose u is unknown, in the order of elimination.
-    ordered: Vec<(u32, f64)>,
+    /// Number of cells around samples.
+    cells: usize,
+    /// Those of them that lost vertices to points.
+    changed: Vec<u32>,
+    /// What is in those now and what they lost: place in the order of elimination, cell and area of the vertices whose u is unknown.
+    parts: Vec<(u32, u32, f64)>,
     vertex_weight: &'a [f64],
     /// Area of every cell, all together 1.
     pub(super) weight: Vec<f64>,
@@ -33,12 +37,14 @@ impl<'a> Cells<'a> {
         places: &[usize],
     ) -> Self {
         let mut cell = samples.nearest.clone();
-        let cells = samples.vertices.len() as u32;
-        let mut count = cells;
+        let cells = samples.vertices.len();
+        let mut is_changed = vec![false; cells];
+        let mut count = cells as u32;
         let mut own = |v: usize| {
             // A vertex that is alone already stays so.
             let cell = &mut cell[v];
-            if *cell < cells {
+            if let Some(is_changed) = is_changed.get_mut(*cell as usize) {
+                *is_changed = true;
                 *cell = count;
                 count += 1;
             }
@@ -56,9 +62,15 @@ impl<'a> Cells<'a> {
         for (&c, w) in cell.iter().zip(vertex_weight) {
             weight[c as usize] += w;
         }
-        let ordered = order.iter().map(|&v| v as usize);
+        let is_part = |c: u32| is_changed.get(c as usize).copied().unwrap_or(true);
+        let ordered = (0..).zip(order).map(|(at, &v)| (at, v as usize));
+        let parts = ordered
+            .filter(|&(_, v)| is_part(cell[v]))
+            .map(|(at, v)| (at, cell[v], vertex_weight[v]));
         Self {
-            ordered: ordered.map(|v| (cell[v], vertex_weight[v])).collect(),
+            parts: parts.collect(),
+            changed: (0..cells as u32).filter(|&c| is_part(c)).collect(),
+            cells,
             cell,
             vertex_weight,
             weight,
@@ -83,12 +95,16 @@ impl<'a> Cells<'a> {
         self.cell[vertex] as usize
     }
 
-    /// The means of several fields side by side, `factor` times, which are 0 at vertices whose u is known.
-    pub(super) fn means_of(&self, columns: &[Row], factor: f64) -> Vec<Row> {
+    /// The means of several fields side by side, `factor` times, which are 0 at vertices whose u is known. `sums`: their integrals over the cells
+    /// around samples, as these are without points.
+    pub(super) fn means_of(&self, columns: &[Row], sums: &[Row], factor: f64) -> Vec<Row> {
         let mut means = vec![[0.0; LANES]; self.weight.len()];
-        for (&(c, w), row) in self.ordered.iter().zip(columns) {
-            let mean = means[c as usize].iter_mut();
-            mean.zip(row).for_each(|(m, x)| *m += w * x);
+        means[..self.cells].copy_from_slice(&sums[..self.cells]);
+        for &c in &self.changed {
+            means[c as usize] = [0.0; LANES];
+        }
+        for &(at, c, w) in &self.parts {
+            add(&mut means[c as usize], w, &columns[at as usize]);
         }
         for (row, w) in means.iter_mut().zip(&self.weight) {
             let share = if *w > 0.0 { factor / w } else { 0.0 };
@@ -107,4 +123,10 @@ impl<'a> Cells<'a> {
         }
         means
     }
+}
+
+/// `sum` + `factor` · `row`.
+#[inline]
+pub(super) fn add(sum: &mut Row, factor: f64, row: &Row) {
+    sum.iter_mut().zip(row).for_each(|(s, x)| *s += factor * x);
 }

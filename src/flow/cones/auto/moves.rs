@@ -8,7 +8,6 @@
 
 use super::placement::Placement;
 use super::pool::{Cones, LEAST_GAIN, Pool, Rule};
-use crate::flow::cones::spread;
 use crate::geometry::ids::VertexId;
 use crate::geometry::mesh::{norm, sub, triangle_area};
 
@@ -43,16 +42,14 @@ impl Placement<'_> {
         let mut places = now.vertices.clone();
         let mut owner: Vec<usize> = (0..count).collect();
         let mut taken: std::collections::BTreeSet<usize> = places.iter().copied().collect();
+        let mut least = vec![f64::INFINITY; self.neighbours.len()];
         for (cone, (&v, c)) in now.vertices.iter().zip(&now.curvature).enumerate() {
-            let around = spread::around(self.mesh, VertexId::new(v), radius);
+            let mut around = self.neighbours.within(radius, v, &mut least);
             // The nearest vertices may be farther away than that.
-            let around: Vec<(usize, f64)> = match around.is_empty() {
-                true => {
-                    let ring = self.neighbours.of(v);
-                    ring.map(|w| (w, 0.75 * radius)).collect()
-                }
-                false => around.iter().map(|(w, d)| (w.index(), *d)).collect(),
-            };
+            if around.is_empty() {
+                let ring = self.neighbours.of(v);
+                around = ring.map(|w| (w, 0.75 * radius)).collect();
+            }
             let mut outer = radius;
             for ring in 0..rings {
                 // The last is a disk.

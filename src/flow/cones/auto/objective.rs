@@ -10,11 +10,13 @@
 //! with |κ| < 2π both integrals are finite on a smooth surface: the optimum is not one of the mesh.
 
 use super::star::Star;
-use super::tableau::{Limits, Tableau};
-use crate::flow::solve::inner_products;
+use super::tableau::{Hessian, Limits, Tableau};
+use crate::flow::solve::{inner_products, half_products};
 
 /// Newton steps at most.
 const STEPS: usize = 40;
+/// Steps that are made where nearly nothing is left.
+const LAST_STEPS: usize = 3;
 /// Gain of a step, relative to the objective, after which it is the last: of curvatures that stay …
 pub(super) const SETTLED: f64 = 1e-9;
 /// … and of those that are only compared.
@@ -39,14 +41,35 @@ pub(super) struct Points<'a> {
     pub(super) base: &'a [f64],
 }
 
-/// What curvature at a place does to u.
-pub(super) struct Answer {
-    /// In the linear picture, of a unit, at every point.
+/// What curvature at some places does to u.
+pub(super) struct Answers {
+    /// In the linear picture, of a unit, at every point; place after place.
     pub(super) field: Vec<f64>,
-    /// The point that is the place itself.
-    pub(super) own: usize,
-    /// What it does there beyond that.
-    pub(super) star: Star,
+    /// The point that each place is itself, …
+    pub(super) own: Vec<usize>,
+    /// … and what it does there beyond that.
+    pub(super) star: Vec<Star>,
+}
+
+impl Answers {
+    fn len(&self) -> usize {
+        self.own.len()
+    }
+
+    fn field(&self, i: usize) -> &[f64] {
+        let points = self.field.len() / self.len();
+        &self.field[i * points..][..points]
+    }
+
+    /// Those of some of the places.
+    pub(super) fn of(&self, places: &[usize]) -> Self {
+        let fields = places.iter().flat_map(|&i| self.field(i));
+        Self {
+            field: fields.copied().collect(),
+            own: places.iter().map(|&i| self.own[i]).collect(),
+            star: places.iter().map(|&i| self.star[i]).collect(),
+        }
+    }
 }
 
 /// The objective at one u.
@@ -93,46 +116,102 @@ impl State {
         let both = grown.iter().zip(shrunk);
         both.map(|(a, b)| 2.0 * (a - b)).collect()
     }
+}
 
-    /// ∂J/∂c of some places with some curvatures; ∂²J/∂c², row by row, and `blend` times that of the variance fourfold.
-    fn derivatives(
-        &self,
-        answers: &[&Answer],
+/// Inner products of tangents: the second derivative of the objective by curvature, row by row.
+struct Products<'a> {
+    answers: &'a Answers,
+    /// What every point counts.
+    by: Vec<f64>,
+    /// What the star of each place adds to its tangent at the place itself.
+    bent: Vec<f64>,
+    /// Means of the tangents, whose products are left out.
+    mean: Vec<[f64; MEANS]>,
+}
+
+/// Derivatives by the curvature of each of some places.
+struct Derivatives<'a> {
+    first: Vec<f64>,
+    /// By the same place twice.
+    second: Vec<f64>,
+    mixed: Products<'a>,
+}
+
+impl<'a> Derivatives<'a> {
+    /// ∂J/∂c of some places with some curvatures; ∂²J/∂c², and `blend` times that of the variance fourfold.
+    fn new(
+        state: &State,
+        answers: &'a Answers,
         curvature: &[f64],
         weight: &[f64],
         blend: f64,
-    ) -> (Vec<f64>, Vec<f64>) {
-        let (count, points) = (answers.len(), weight.len());
-        let [grown, shrunk] = &self.shares;
+    ) -> Self {
+        let [grown, shrunk] = &state.shares;
         let both = grown.iter().zip(shrunk).zip(weight);
-        let root: Vec<f64> = both
-            .map(|((a, b), w)| (a + b + 2.0 * blend * w).sqrt())
-            .collect();
-        // Tangents times the root of what weighs their products; then what gives their means in the same products.
-        let all = count + MEANS;
-        let mut columns = Vec::with_capacity(all * points);
-        for (answer, c) in answers.iter().zip(curvature) {
-            let own = columns.len() + answer.own;
-            columns.extend(answer.field.iter().zip(&root).map(|(g, r)| g * r));
-            columns[own] += answer.star.excess_slope(*c) * root[answer.own];
+        let by: Vec<f64> = both.map(|((a, b), w)| a + b + 2.0 * blend * w).collect();
+        let stars = answers.star.iter().zip(curvature);
+        let bent: Vec<f64> = stars.map(|(star, c)| star.excess_slope(*c)).collect();
+        let over = [grown, shrunk, weight].concat();
+        let means = inner_products(&over, &answers.field, [MEANS, answers.len()]);
+        // The product of two tangents has the last mean so often.
+        let root = (2.0 * blend).sqrt();
+        let places = answers.len();
+        let mut mean = Vec::with_capacity(places);
+        let (mut first, mut second) = (Vec::with_capacity(places), Vec::with_capacity(places));
+        for (i, (&own, bent)) in answers.own.iter().zip(&bent).enumerate() {
+            let over = |m: usize, at: f64| means[m * places + i] + bent * at;
+            let [a, b] = [over(0, grown[own]), over(1, shrunk[own])];
+            let c = root * over(2, weight[own]);
+            let field = answers.field(i);
+            let square = squares(field, &by) + bent * by[own] * (2.0 * field[own] + bent);
+            first.push(2.0 * (a - b));
+            second.push(4.0 * (square - a * a - b * b - c * c));
+            mean.push([a, b, c]);
         }
-        for of in [grown, shrunk, weight] {
-            let parts = of.iter().zip(&root);
-            columns.extend(parts.map(|(x, r)| if *r > 0.0 { x / r } else { 0.0 }));
+        Self {
+            first,
+            second,
+            mixed: Products {
+                answers,
+                by,
+                bent,
+                mean,
+            },
         }
-        let products = inner_products(&columns, all);
-        let mean = |i: usize| &products[i * all + count..][..MEANS];
-        let slope = (0..count).map(|i| 2.0 * (mean(i)[0] - mean(i)[1]));
-        let mut matrix = Vec::with_capacity(count * count);
-        for i in 0..count {
-            let a = mean(i);
-            matrix.extend((0..count).map(|j| {
-                let b = mean(j);
-                let means = a[0] * b[0] + a[1] * b[1] + 2.0 * blend * a[2] * b[2];
-                4.0 * (products[i * all + j] - means)
-            }));
+    }
+}
+
+impl Hessian for Products<'_> {
+    fn rows(&self, places: &[usize]) -> Vec<f64> {
+        let all = self.answers.len();
+        let mut tangents = Vec::with_capacity(places.len() * self.by.len());
+        for &i in places {
+            let own = tangents.len() + self.answers.own[i];
+            let field = self.answers.field(i).iter().zip(&self.by);
+            tangents.extend(field.map(|(g, by)| g * by));
+            tangents[own] += self.bent[i] * self.by[self.answers.own[i]];
         }
-        (slope.collect(), matrix)
+        let fields = &self.answers.field;
+        let mut rows = match places.len() == all {
+            true => half_products(&tangents, fields, all),
+            false => inner_products(&tangents, fields, [places.len(), all]),
+        };
+        let tangents = tangents.chunks(self.by.len().max(1));
+        for ((row, tangent), &i) in rows.chunks_mut(all).zip(tangents).zip(places) {
+            let [a, b, c] = self.mean[i];
+            let others = self.answers.own.iter().zip(&self.bent).zip(&self.mean);
+            for (x, ((&own, bent), mean)) in row.iter_mut().zip(others) {
+                let means = a * mean[0] + b * mean[1] + c * mean[2];
+                *x = 4.0 * (*x + bent * tangent[own] - means);
+            }
+        }
+        if places.len() == all {
+            // Half of it is the other half.
+            for i in 0..all {
+                (0..i).for_each(|j| rows[i * all + j] = rows[j * all + i]);
+            }
+        }
+        rows
     }
 }
 
@@ -146,17 +225,17 @@ pub(super) struct Weighed {
 
 impl Points<'_> {
     /// u with cones.
-    pub(super) fn log_scale(&self, answers: &[&Answer], curvature: &[f64]) -> Vec<f64> {
+    pub(super) fn log_scale(&self, answers: &Answers, curvature: &[f64]) -> Vec<f64> {
         let mut u = self.base.to_vec();
-        for (answer, &c) in answers.iter().zip(curvature).filter(|(_, c)| **c != 0.0) {
-            let field = u.iter_mut().zip(&answer.field);
+        for (i, &c) in curvature.iter().enumerate().filter(|(_, c)| **c != 0.0) {
+            let field = u.iter_mut().zip(answers.field(i));
             field.for_each(|(u, g)| *u += c * g);
-            u[answer.own] += answer.star.excess(c);
+            u[answers.own[i]] += answers.star[i].excess(c);
         }
         u
     }
 
-    pub(super) fn state(&self, answers: &[&Answer], curvature: &[f64]) -> State {
+    pub(super) fn state(&self, answers: &Answers, curvature: &[f64]) -> State {
         State::new(self.spread, &self.log_scale(answers, curvature))
     }
 
@@ -164,47 +243,50 @@ impl Points<'_> {
     ///
     /// Where much is distorted, little area rules J and its second derivative, which then says nothing about the rest. The variance
     /// does, so a share of that is added, which falls with J: Newton's method with it converges, if more slowly.
-    pub(super) fn model(&self, answers: &[&Answer], curvature: &[f64], limits: Limits) -> Tableau {
+    pub(super) fn model<'a>(
+        &self,
+        answers: &'a Answers,
+        curvature: &[f64],
+        limits: Limits,
+    ) -> Tableau<'a> {
         self.model_at(&self.state(answers, curvature), answers, curvature, limits)
     }
 
-    fn model_at(
+    fn model_at<'a>(
         &self,
         state: &State,
-        answers: &[&Answer],
+        answers: &'a Answers,
         curvature: &[f64],
         limits: Limits,
-    ) -> Tableau {
+    ) -> Tableau<'a> {
         let blend = BLEND * state.value.clamp(0.0, 1.0);
-        let (mut slope, matrix) = state.derivatives(answers, curvature, self.weight, blend);
-        let rows = matrix.chunks(answers.len().max(1));
-        for (slope, row) in slope.iter_mut().zip(rows) {
-            *slope -= dot(row, curvature);
-        }
-        Tableau::new(&matrix, &slope, limits)
+        let there = Derivatives::new(state, answers, curvature, self.weight, blend);
+        Tableau::new(there.mixed, there.second, there.first, curvature, limits)
     }
 
     /// Four times the variance of u, which J is where it is small, as a function of the curvatures; exact, so that no place for it need be near.
-    pub(super) fn variance(&self, answers: &[&Answer], limits: Limits) -> Tableau {
+    pub(super) fn variance<'a>(&self, answers: &'a Answers, limits: Limits) -> Tableau<'a> {
         let even = State {
             value: 0.0,
             shares: [self.weight.to_vec(), self.weight.to_vec()],
         };
-        let (_, matrix) = even.derivatives(answers, &vec![0.0; answers.len()], self.weight, 0.0);
+        let none = vec![0.0; answers.len()];
+        let there = Derivatives::new(&even, answers, &none, self.weight, 0.0);
         let mean = dot(self.base, self.weight);
         let by = self.base.iter().zip(self.weight);
         let by: Vec<f64> = by.map(|(u, w)| 8.0 * w * (u - mean)).collect();
-        let slope = answers
-            .iter()
-            .map(|g| dot(&g.field, &by) + g.star.excess_slope(0.0) * by[g.own]);
+        let own = answers.own.iter().zip(&there.mixed.bent);
+        let slope = own
+            .enumerate()
+            .map(|(i, (&own, bent))| dot(answers.field(i), &by) + bent * by[own]);
         let slope: Vec<f64> = slope.collect();
-        Tableau::new(&matrix, &slope, limits)
+        Tableau::new(there.mixed, there.second, slope, &none, limits)
     }
 
     /// The best curvatures from some that are near; `settled`: gain of the last step.
     pub(super) fn best(
         &self,
-        answers: &[&Answer],
+        answers: &Answers,
         start: &[f64],
         limits: Limits,
         settled: f64,
@@ -212,20 +294,23 @@ impl Points<'_> {
         let mut curvature = start.to_vec();
         let mut state = self.state(answers, start);
         let mut is_feasible = limits.are_met(start, 1e-9);
+        let mut last_steps = 0;
         for _ in 0..STEPS {
             let mut model = self.model_at(&state, answers, &curvature, limits);
+            model.complete();
             for i in 0..answers.len() {
                 model.free(i);
             }
             model.settle();
             let next: Vec<f64> = (0..answers.len()).map(|i| model.curvature(i)).collect();
-            // Where nearly nothing is left, J is rounding, but its derivative is not: the last step is not asked what it gains.
+            // Where nearly nothing is left, J is rounding, but its derivative is not: the last steps are not asked what they gain.
             let is_last = is_feasible && state.value < NOTHING;
             // Where the start keeps neither total nor limits there is nothing to compare with.
             if is_last || !is_feasible {
                 state = self.state(answers, &next);
                 (curvature, is_feasible) = (next, true);
-                if is_last {
+                last_steps += usize::from(is_last);
+                if last_steps == LAST_STEPS {
                     break;
                 }
                 continue;
@@ -253,17 +338,28 @@ impl Points<'_> {
     }
 }
 
+/// Σ b a² in a fixed order.
+fn squares(a: &[f64], b: &[f64]) -> f64 {
+    sum_of(a, b, |a, b| a * a * b)
+}
+
 /// Σ a b in a fixed order.
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // Four sums side by side are quicker than one.
-    let mut sums = [0.0; 4];
-    let (whole_a, rest_a) = a.as_chunks::<4>();
-    let (whole_b, rest_b) = b.as_chunks::<4>();
+    sum_of(a, b, |a, b| a * b)
+}
+
+#[inline(always)]
+fn sum_of(a: &[f64], b: &[f64], term: impl Fn(f64, f64) -> f64) -> f64 {
+    // Eight sums side by side are quicker than one.
+    let mut sums = [0.0; 8];
+    let (whole_a, rest_a) = a.as_chunks::<8>();
+    let (whole_b, rest_b) = b.as_chunks::<8>();
     for (a, b) in whole_a.iter().zip(whole_b) {
         for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
-            *sum += a * b;
+            *sum += term(*a, *b);
         }
     }
-    let rest: f64 = rest_a.iter().zip(rest_b).map(|(a, b)| a * b).sum();
-    sums[0] + sums[1] + (sums[2] + sums[3]) + rest
+    let rest: f64 = rest_a.iter().zip(rest_b).map(|(a, b)| term(*a, *b)).sum();
+    let [a, b, c, d, e, f, g, h] = sums;
+    ((a + b) + (c + d)) + ((e + f) + (g + h)) + rest
 }

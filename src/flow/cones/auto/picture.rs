@@ -10,13 +10,15 @@
 //! A surface with boundary is doubled, as in the flow; a field has one value a vertex of the surface. Where the boundary is free,
 //! u = 0 there and curvature need not add up to anything.
 
+use super::candidates::Samples;
+use super::cells::add;
 use super::star::Star;
 use crate::flow::cones::error::ConeError;
 use crate::flow::delaunay::Delaunay;
 use crate::flow::doubled::Doubled;
 use crate::flow::laplacian::{System, Unknowns};
 use crate::flow::metric::{Evaluation, Metric};
-use crate::flow::solve::Row;
+use crate::flow::solve::{LANES, Row};
 use crate::geometry::ids::{NONE, VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, triangle_area};
 
@@ -161,6 +163,18 @@ impl Picture {
     pub(super) fn columns(&self, vertices: &[usize], columns: &mut Vec<Row>) {
         let positions: Vec<u32> = vertices.iter().map(|&v| self.position[v]).collect();
         self.system.solver.columns(&positions, columns);
+    }
+
+    /// Integrals of [`columns`](Self::columns) over the cells around some samples.
+    pub(super) fn sums(&self, columns: &[Row], samples: &Samples, sums: &mut Vec<Row>) {
+        sums.clear();
+        sums.resize(samples.vertices.len(), [0.0; LANES]);
+        for (&v, row) in self.order.iter().zip(columns) {
+            let v = v as usize;
+            if let Some(sum) = sums.get_mut(samples.nearest[v] as usize) {
+                add(sum, self.weight[v], row);
+            }
+        }
     }
 
     /// What the stars of all vertices add to the log scale for changes of curvature, radians.

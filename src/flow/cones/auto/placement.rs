@@ -6,13 +6,13 @@
 use super::candidates::Samples;
 use super::cells::Cells;
 use super::neighbours::Neighbours;
-use super::objective::State;
+use super::objective::{Answers, State};
 use super::picture::Picture;
-use super::star::Star;
 use super::tableau::Limits;
 use crate::flow::solve::{LANES, Row};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::mesh::Mesh;
+use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Numbers in the columns that are kept.
@@ -23,9 +23,21 @@ const SAMPLES: [usize; 3] = [8, 500, 1000];
 const SMALL: usize = 2000;
 
 /// Columns that were computed.
+#[derive(Default)]
 struct Known {
     vertices: Vec<usize>,
     columns: Vec<Row>,
+    /// Their sums over the cells of the samples.
+    sums: Vec<Row>,
+}
+
+/// Cones whose log scale was asked for.
+#[derive(Default)]
+struct Asked {
+    vertices: Vec<usize>,
+    curvature: Vec<f64>,
+    /// What they add to u in the linear picture.
+    added: Vec<f64>,
 }
 
 /// Cones to be chosen.
@@ -50,8 +62,10 @@ pub(super) struct Placement<'a> {
     pub(super) regions: Samples,
     /// The search comes back to the same places again and again.
     known: Vec<Known>,
+    /// Often the next question is about the same.
+    last: RefCell<Asked>,
     /// Memory of columns that were forgotten.
-    spare: Vec<Vec<Row>>,
+    spare: Vec<Known>,
 }
 
 impl<'a> Placement<'a> {
@@ -75,13 +89,14 @@ impl<'a> Placement<'a> {
             picture.solve(&mut sunk);
         }
         let connectivity = &mesh.connectivity;
-        let neighbours = Neighbours::new(connectivity);
+        let neighbours = Neighbours::new(mesh);
         let [each, least, most] = SAMPLES;
         let count = (base.len() / each).clamp(least, most);
         Self {
             samples: Samples::new(&neighbours, &allowed, &base, count),
             regions: Samples::none(),
             known: Vec::new(),
+            last: RefCell::default(),
             spare: Vec::new(),
             mesh,
             connectivity,
@@ -99,11 +114,6 @@ impl<'a> Placement<'a> {
     /// Area of every vertex, all together 1.
     pub(super) fn weight(&self) -> &[f64] {
         &self.picture.weight
-    }
-
-    /// The faces around a vertex.
-    pub(super) fn star(&self, vertex: usize) -> Star {
-        self.picture.star[vertex]
     }
 
     /// J of a log scale; infinite where that is no number.
@@ -136,10 +146,19 @@ impl<'a> Placement<'a> {
 
     /// u of some cones.
     pub(super) fn log_scale_of(&self, vertices: &[usize], curvature: &[f64]) -> Vec<f64> {
-        let mut field = vec![0.0; self.len()];
-        self.add_cones(&mut field, vertices, curvature);
-        self.picture.solve(&mut field);
-        field.iter_mut().zip(&self.base).for_each(|(x, b)| *x += b);
+        let mut last = self.last.borrow_mut();
+        if last.added.is_empty() || last.vertices != vertices || last.curvature != curvature {
+            let mut added = vec![0.0; self.len()];
+            self.add_cones(&mut added, vertices, curvature);
+            self.picture.solve(&mut added);
+            *last = Asked {
+                vertices: vertices.to_vec(),
+                curvature: curvature.to_vec(),
+                added,
+            };
+        }
+        let field = last.added.iter().zip(&self.base);
+        let mut field: Vec<f64> = field.map(|(x, b)| x + b).collect();
         for (&v, c) in vertices.iter().zip(curvature) {
             field[v] += self.picture.star[v].excess(*c);
         }
@@ -179,52 +198,52 @@ impl<'a> Placement<'a> {
         Cells::new(&self.neighbours, &self.samples, weight, order, places)
     }
 
-    /// The answer of each place: the log scale that a unit of curvature there causes, on average in every cell.
-    pub(super) fn answers(&mut self, places: &[usize], cells: &Cells) -> Vec<Vec<f64>> {
+    /// The answers of places: the log scale that a unit of curvature at each causes, on average in every cell.
+    pub(super) fn answers(&mut self, places: &[usize], cells: &Cells) -> Answers {
         let sunk = match self.sunk.is_empty() {
             true => vec![0.0; cells.weight.len()],
             false => cells.means(&self.sunk),
         };
-        let mut answer: BTreeMap<usize, Vec<f64>> =
-            places.iter().map(|&v| (v, Vec::new())).collect();
+        // Where each is among the places.
+        let index: BTreeMap<usize, usize> = places.iter().copied().zip(0..).collect();
+        let points = sunk.len();
+        let mut field = vec![0.0; places.len() * points];
         let copies = self.picture.copies;
-        let mut take = |vertices: &[usize], columns: &[Row]| {
-            let means = cells.means_of(columns, copies);
-            for (lane, v) in vertices.iter().enumerate() {
-                if let Some(answer) = answer.get_mut(v) {
-                    let means = means.iter().zip(&sunk);
-                    *answer = means.map(|(m, s)| m[lane] - s).collect();
+        let mut take = |known: &Known| {
+            let means = cells.means_of(&known.columns, &known.sums, copies);
+            let lanes = known.vertices.iter().enumerate();
+            for (lane, i) in lanes.filter_map(|(lane, v)| Some((lane, index.get(v)?))) {
+                let answer = field[i * points..][..points].iter_mut();
+                for ((x, mean), sunk) in answer.zip(&means).zip(&sunk) {
+                    *x = mean[lane] - sunk;
                 }
             }
         };
-        let known: BTreeSet<usize> = self
-            .known
-            .iter()
-            .flat_map(|k| &k.vertices)
-            .copied()
-            .collect();
-        let wanted = |known: &&Known| known.vertices.iter().any(|v| places.contains(v));
-        for known in self.known.iter().filter(wanted) {
-            take(&known.vertices, &known.columns);
-        }
-        let new: BTreeSet<usize> = places.iter().copied().collect();
-        let mut new: Vec<usize> = new.difference(&known).copied().collect();
+        let known = self.known.iter().flat_map(|k| &k.vertices);
+        let known: BTreeSet<usize> = known.copied().collect();
+        let wanted = |known: &&Known| known.vertices.iter().any(|v| index.contains_key(v));
+        self.known.iter().filter(wanted).for_each(&mut take);
+        let new = index.keys().copied().filter(|v| !known.contains(v));
+        let mut new: Vec<usize> = new.collect();
         // Neighbours in the order of elimination have most of the way to its end in common.
         new.sort_unstable_by_key(|&v| self.picture.position[v]);
         for vertices in new.chunks(LANES) {
-            let mut columns = self.spare.pop().unwrap_or_default();
-            self.picture.columns(vertices, &mut columns);
-            take(vertices, &columns);
-            match (self.known.len() + 1) * columns.len() <= KNOWN / LANES {
-                true => self.known.push(Known {
-                    vertices: vertices.to_vec(),
-                    columns,
-                }),
-                false => self.spare.push(columns),
+            let mut known = self.spare.pop().unwrap_or_default();
+            known.vertices = vertices.to_vec();
+            self.picture.columns(vertices, &mut known.columns);
+            self.picture
+                .sums(&known.columns, &self.samples, &mut known.sums);
+            take(&known);
+            match (self.known.len() + 1) * known.columns.len() <= KNOWN / LANES {
+                true => self.known.push(known),
+                false => self.spare.push(known),
             }
         }
-        let answers = places.iter().map(|v| answer.get(v).cloned());
-        answers.map(Option::unwrap_or_default).collect()
+        Answers {
+            field,
+            own: places.iter().map(|&v| cells.of(v)).collect(),
+            star: places.iter().map(|&v| self.picture.star[v]).collect(),
+        }
     }
 
     /// Forgets all answers but those of some places, and of what is beside them.
@@ -232,7 +251,7 @@ impl<'a> Placement<'a> {
         for known in std::mem::take(&mut self.known) {
             match known.vertices.iter().any(|v| places.contains(v)) {
                 true => self.known.push(known),
-                false => self.spare.push(known.columns),
+                false => self.spare.push(known),
             }
         }
     }

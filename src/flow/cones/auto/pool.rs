@@ -1,10 +1,10 @@
 //! The best cones among some places.
 //!
 //! *Enters:* places. *Leaves:* those of them that are worth a cone, with the best curvatures: found by adding, exchanging and taking away on
-//! the second-order model of the objective, which a [`Tableau`] answers for all places at once. What comes out is weighed by the objective
+//! the second-order model of the objective, read off a [`Tableau`]. What comes out is weighed by the objective
 //! itself, and taken up if it is better.
 
-use super::objective::{Answer, COMPARED, NOTHING, Points, SETTLED};
+use super::objective::{Answers, COMPARED, NOTHING, Points, SETTLED};
 use super::placement::Placement;
 use super::tableau::{Limits, Tableau};
 
@@ -31,7 +31,7 @@ pub(super) struct Pool {
     /// u without cones.
     base: Vec<f64>,
     /// What curvature at each place does to u.
-    answers: Vec<Answer>,
+    answers: Answers,
     limits: Limits,
 }
 
@@ -45,9 +45,9 @@ pub(super) struct Set {
 }
 
 /// Members that no exchange makes better, and the second-order model around them where it was made.
-struct Settled {
+struct Settled<'a> {
     set: Set,
-    model: Option<Tableau>,
+    model: Option<Tableau<'a>>,
 }
 
 /// Chosen cones.
@@ -73,15 +73,6 @@ impl Pool {
         let cells = placement.cells(&weight, &vertices);
         let base = cells.means(&placement.base);
         let answers = placement.answers(&vertices, &cells);
-        let answers = answers
-            .into_iter()
-            .zip(&vertices)
-            .map(|(field, &v)| Answer {
-                field,
-                own: cells.of(v),
-                star: placement.star(v),
-            });
-        let answers = answers.collect();
         Self {
             base,
             spread: cells.spread(near),
@@ -102,10 +93,6 @@ impl Pool {
             spread: [&self.spread[0], &self.spread[1]],
             base: &self.base,
         }
-    }
-
-    pub(super) fn answers(&self, members: &[usize]) -> Vec<&Answer> {
-        members.iter().map(|&m| &self.answers[m]).collect()
     }
 
     /// Places as members of this pool.
@@ -133,7 +120,7 @@ impl Pool {
     }
 
     fn weighed(&self, members: Vec<usize>, start: &[f64], rule: Rule, settled: f64) -> Set {
-        let answers = self.answers(&members);
+        let answers = self.answers.of(&members);
         let (curvature, value) = match rule {
             Rule::Best => {
                 let best = self.points().best(&answers, start, self.limits, settled);
@@ -158,14 +145,12 @@ impl Pool {
     }
 
     /// The second-order model around a set, with its members in.
-    pub(super) fn model(&self, set: &Set, rule: Rule) -> Tableau {
-        let all: Vec<usize> = (0..self.len()).collect();
+    pub(super) fn model(&self, set: &Set, rule: Rule) -> Tableau<'_> {
         let mut curvature = vec![0.0; self.len()];
         for (&m, c) in set.members.iter().zip(&set.curvature) {
             curvature[m] = *c;
         }
-        let answers = self.answers(&all);
-        let mut model = self.points().model(&answers, &curvature, self.limits);
+        let mut model = self.points().model(&self.answers, &curvature, self.limits);
         for (&m, c) in set.members.iter().zip(&set.curvature) {
             match rule {
                 Rule::Best => {
@@ -192,7 +177,7 @@ impl Pool {
         self.settled(set, rule, may).set
     }
 
-    fn settled(&self, mut set: Set, rule: Rule, may: impl Fn(usize, usize) -> bool) -> Settled {
+    fn settled(&self, mut set: Set, rule: Rule, may: impl Fn(usize, usize) -> bool) -> Settled<'_> {
         let [all, most, least] = PASSES;
         for _ in 0..(all / set.members.len().max(1)).clamp(least, most) {
             if set.value <= NOTHING {
@@ -213,9 +198,9 @@ impl Pool {
     }
 
     /// All exchanges that the model wants; then less and less of it, if the objective disagrees. `None` where nothing gains.
-    fn exchanged_once(
-        &self,
-        model: &Tableau,
+    fn exchanged_once<'a>(
+        &'a self,
+        model: &Tableau<'a>,
         set: &Set,
         rule: Rule,
         may: &impl Fn(usize, usize) -> bool,
@@ -240,14 +225,14 @@ impl Pool {
     }
 
     /// At most `most` exchanges in the model, each the best there is, and how many there were.
-    fn exchanged(
-        &self,
-        mut model: Tableau,
+    fn exchanged<'a>(
+        &'a self,
+        mut model: Tableau<'a>,
         value: f64,
         rule: Rule,
         most: usize,
         may: &impl Fn(usize, usize) -> bool,
-    ) -> (Tableau, usize) {
+    ) -> (Tableau<'a>, usize) {
         let mut made = 0;
         // Where a place came from, which says where it may go.
         let mut origin: Vec<usize> = (0..self.len()).collect();
@@ -298,8 +283,7 @@ impl Pool {
     /// Local optima of `count` of the places, or fewer where there are no more, the best `most` first: from those that lower the variance most, and
     /// where that is cheap from those that lower J most, some at a time.
     pub(super) fn best(&self, count: usize, most: usize) -> Vec<Set> {
-        let all: Vec<usize> = (0..self.len()).collect();
-        let model = self.points().variance(&self.answers(&all), self.limits);
+        let model = self.points().variance(&self.answers, self.limits);
         let mut starts = vec![self.grown(model, 0, count)];
         if count <= DETOURS[1] {
             let mut by_parts = self.weigh(Vec::new(), &[], Rule::Fixed);
@@ -377,7 +361,7 @@ impl Pool {
     ///
     /// More cones are added, all are exchanged, the least valuable are taken away, and what is left is exchanged once more. Many more and few
     /// more lead out of different optima.
-    fn with_detours(&self, mut best: Settled, count: usize) -> Set {
+    fn with_detours<'a>(&'a self, mut best: Settled<'a>, count: usize) -> Set {
         let any = |_: usize, _: usize| true;
         let [least, most] = MORE_CONES;
         let detours = match count {
@@ -400,7 +384,7 @@ impl Pool {
         best.set
     }
 
-    fn model_of(&self, settled: &mut Settled) -> Tableau {
+    fn model_of<'a>(&'a self, settled: &mut Settled<'a>) -> Tableau<'a> {
         let Settled { set, model } = settled;
         let model = model.get_or_insert_with(|| self.model(set, Rule::Best));
         model.clone()

@@ -85,6 +85,8 @@ impl Quanta {
             let mut most = usize::MAX;
             let better = loop {
                 let mut model = pool.model(&set, Rule::Fixed);
+                // A quantum may go from any place to any.
+                model.complete();
                 let mut next = numbers.clone();
                 let mut made = 0;
                 while made < most && self.step(&mut model, &mut next, count, set.value) {

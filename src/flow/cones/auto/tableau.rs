@@ -5,7 +5,18 @@
 //!
 //! The symmetric matrix of the equations, with a last row for the total, is pivoted (swept) on the places that have a curvature of their
 //! own choice. What is left of the diagonal elsewhere is the second derivative along the way where all others adapt, and what is left
-//! of the right side is the derivative there. One pivot costs P² operations; every promise is read off the entries.
+//! of the right side is the derivative there. Every promise is read off the entries.
+//!
+//! All that is read is the diagonal, the right side, and the rows of places that have a curvature: few of many. The row of a place is worked out when it
+//! gets one for the first time, and what pivots did before is made up for. With R such rows a pivot costs R P operations, not P².
+
+use std::rc::Rc;
+
+/// The second derivatives of an energy, worked out row by row.
+pub(super) trait Hessian {
+    /// The rows of some places in ascending order, one after another; in each a number for every place.
+    fn rows(&self, places: &[usize]) -> Vec<f64>;
+}
 
 /// What the curvatures must keep, radians.
 #[derive(Clone, Copy, Debug)]
@@ -50,11 +61,14 @@ const ROUNDING: f64 = 1e-13;
 
 /// The equations of all places, solved for some of them.
 #[derive(Clone)]
-pub(super) struct Tableau {
+pub(super) struct Tableau<'a> {
+    hessian: Rc<dyn Hessian + 'a>,
     /// Number of places; the row of the total follows them.
     places: usize,
-    /// Row after row.
-    entry: Vec<f64>,
+    /// Rows of places that have or had a curvature, and of the total; others are empty.
+    row: Vec<Vec<f64>>,
+    /// Entries of all rows on the diagonal.
+    diagonal: Vec<f64>,
     /// Of a free place minus its curvature, of another the derivative of the energy by its curvature.
     right: Vec<f64>,
     /// H_ii as it was.
@@ -65,35 +79,81 @@ pub(super) struct Tableau {
     limits: Limits,
 }
 
-impl Tableau {
-    /// All places with curvature 0. `matrix`: H row by row; `slope`: b.
-    pub(super) fn new(matrix: &[f64], slope: &[f64], limits: Limits) -> Self {
+impl<'a> Tableau<'a> {
+    /// All places with curvature 0. `diagonal`: that of H; `slope`: the derivatives of the energy where the places have the curvatures `at`, radians.
+    pub(super) fn new(
+        hessian: impl Hessian + 'a,
+        diagonal: Vec<f64>,
+        slope: Vec<f64>,
+        at: &[f64],
+        limits: Limits,
+    ) -> Self {
         let places = slope.len();
         let size = places + 1;
-        let mut entry = vec![0.0; size * size];
-        let has_total = limits.total.is_some();
-        for i in 0..places {
-            entry[i * size..][..places].copy_from_slice(&matrix[i * places..][..places]);
-            if has_total {
-                entry[i * size + places] = 1.0;
-                entry[places * size + i] = 1.0;
-            }
+        let mut row = vec![Vec::new(); size];
+        if limits.total.is_some() {
+            row[places] = vec![1.0; size];
+            row[places][places] = 0.0;
         }
-        let mut right = slope.to_vec();
-        right.push(-limits.total.unwrap_or(0.0));
-        Self {
-            own: (0..places).map(|i| entry[i * size + i]).collect(),
+        let mut tableau = Self {
+            hessian: Rc::new(hessian),
+            own: diagonal.clone(),
             is_free: vec![false; size],
             level: vec![0.0; size],
             places,
-            entry,
-            right,
+            row,
+            diagonal,
+            right: slope,
             limits,
+        };
+        tableau.diagonal.push(0.0);
+        tableau.right.push(-limits.total.unwrap_or(0.0));
+        let there: Vec<usize> = (0..places).filter(|&k| at[k] != 0.0).collect();
+        tableau.bring(&there);
+        for k in there {
+            let rights = tableau.right[..places].iter_mut().zip(&tableau.row[k]);
+            rights.for_each(|(r, x)| *r -= at[k] * x);
+        }
+        tableau
+    }
+
+    /// Works out all rows: for many questions about places without curvature.
+    pub(super) fn complete(&mut self) {
+        let all: Vec<usize> = (0..self.places).collect();
+        self.bring(&all);
+    }
+
+    /// Sees to it that some places have their rows.
+    fn bring(&mut self, places: &[usize]) {
+        let new = places.iter().copied().filter(|&k| self.row[k].is_empty());
+        let new: Vec<usize> = new.collect();
+        if new.is_empty() {
+            return;
+        }
+        let rows = self.hessian.rows(&new);
+        let free: Vec<usize> = (0..=self.places).filter(|&f| self.is_free[f]).collect();
+        let of_total = f64::from(self.limits.total.is_some());
+        for (&k, own) in new.iter().zip(rows.chunks(self.places)) {
+            let mut row = own.to_vec();
+            row.push(of_total);
+            let factors: Vec<f64> = free.iter().map(|&f| row[f]).collect();
+            for (&f, factor) in free.iter().zip(&factors) {
+                let entries = row.iter_mut().zip(&self.row[f]);
+                entries.for_each(|(x, r)| *x -= factor * r);
+            }
+            free.iter().for_each(|&f| row[f] = self.row[f][k]);
+            row[k] = self.diagonal[k];
+            self.row[k] = row;
         }
     }
 
+    /// An entry on the diagonal, or of a row that there is.
     fn at(&self, i: usize, j: usize) -> f64 {
-        self.entry[i * (self.places + 1) + j]
+        match self.row[i].get(j) {
+            _ if i == j => self.diagonal[i],
+            Some(entry) => *entry,
+            None => self.row[j][i],
+        }
     }
 
     /// Curvature of a place.
@@ -106,33 +166,40 @@ impl Tableau {
 
     /// Solves for `k`, or no longer.
     fn pivot(&mut self, k: usize) {
-        let size = self.places + 1;
-        let row: Vec<f64> = self.entry[k * size..][..size].to_vec();
+        self.bring(&[k]);
+        let mut row = std::mem::take(&mut self.row[k]);
         let (pivot, right) = (row[k], self.right[k]);
-        for i in (0..size).filter(|&i| i != k && row[i] != 0.0) {
-            let factor = row[i] / pivot;
-            let entries = self.entry[i * size..][..size].iter_mut().zip(&row);
-            entries.for_each(|(x, r)| *x -= factor * r);
-            self.right[i] -= factor * right;
-        }
         let sign = if self.is_free[k] { -1.0 } else { 1.0 };
-        for (i, r) in row.iter().enumerate() {
-            let x = sign * r / pivot;
-            self.entry[k * size + i] = x;
-            self.entry[i * size + k] = x;
+        let others = self.row.iter_mut().zip(&row);
+        for (other, x) in others.filter(|(other, _)| !other.is_empty()) {
+            if *x != 0.0 {
+                let factor = x / pivot;
+                let entries = other.iter_mut().zip(&row);
+                entries.for_each(|(x, r)| *x -= factor * r);
+            }
+            other[k] = sign * x / pivot;
         }
-        self.entry[k * size + k] = -1.0 / pivot;
+        for (i, x) in row.iter_mut().enumerate() {
+            let factor = *x / pivot;
+            if factor != 0.0 {
+                self.diagonal[i] -= factor * *x;
+                self.right[i] -= factor * right;
+            }
+            *x = sign * factor;
+        }
+        row[k] = -1.0 / pivot;
+        self.diagonal[k] = row[k];
         self.right[k] = sign * right / pivot;
+        self.row[k] = row;
         self.is_free[k] = !self.is_free[k];
     }
 
     /// Changes the curvature of a place that is not free.
     fn set(&mut self, k: usize, curvature: f64) {
-        let size = self.places + 1;
         let change = curvature - self.level[k];
         if change != 0.0 {
-            let column = self.entry[k * size..][..size].iter();
-            let rights = self.right.iter_mut().zip(column);
+            self.bring(&[k]);
+            let rights = self.right.iter_mut().zip(&self.row[k]);
             rights.for_each(|(r, x)| *r += change * x);
             self.level[k] = curvature;
         }
@@ -242,7 +309,7 @@ impl Tableau {
 
     /// The change of energy when place `j` has curvature in the stead of `i`.
     pub(super) fn exchange(&self, i: usize, j: usize) -> f64 {
-        let (x, own) = (self.at(j, i), self.own[j]);
+        let (x, own) = (self.at(i, j), self.own[j]);
         let (slope, bend) = match self.is_free[i] {
             true if self.must_stay() => return self.first_instead(i, j),
             true => {
