@@ -1,13 +1,17 @@
 //! One face of the final triangulation, laid out by its lengths: distances between points on its sides.
 //!
 //! *Guaranteed:* full relative accuracy for any shape and any scale, since only differences along a side are ever taken: with a, b
-//! the distances of two points from the corner between their sides, d² = (a − b)² + 4 sin²(θ/2) ab.
+//! the distances of two points from the corner between their sides, d² = (a − b)² + 4 sin²(θ/2) ab. Points near either end of a side keep their
+//! digits, since both fractions are given: one of them is exact, and the rest of a side that is nearly 1 is not taken from it.
 
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceId};
 
-/// A point on a side: which side, and the fraction of its length from the corner where it begins.
-pub(super) type OnSide = (usize, f64);
+/// A point on a side: which side, and the fractions of its length before and behind the point, from the corner where it begins.
+pub(super) type OnSide = (usize, Fractions);
+
+/// Parts of a side before a point and behind it; together 1, up to rounding.
+pub(super) type Fractions = [f64; 2];
 
 /// Lengths and corners of a flat face.
 pub(super) struct FlatFace {
@@ -34,11 +38,13 @@ impl FlatFace {
     /// Distance of two points; the same for either order.
     pub fn distance(&self, p: OnSide, q: OnSide) -> f64 {
         if p.0 == q.0 {
-            return (q.1 - p.1).abs() * self.side[p.0];
+            // From the end that both are near to, if there is one.
+            let end = usize::from(p.1[0].min(q.1[0]) > 0.5);
+            return (q.1[end] - p.1[end]).abs() * self.side[p.0];
         }
         // Let q be on the side after p's, so that they meet at the corner where q's side begins.
         let (p, q) = if q.0 == (p.0 + 1) % 3 { (p, q) } else { (q, p) };
-        let (a, b) = ((1.0 - p.1) * self.side[p.0], q.1 * self.side[q.0]);
+        let (a, b) = (p.1[1] * self.side[p.0], q.1[0] * self.side[q.0]);
         (a - b).hypot((self.opening[q.0] * a).sqrt() * b.sqrt())
     }
 }
@@ -54,17 +60,34 @@ mod tests {
         let between = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]);
         let sides = [0, 1, 2].map(|k| between(corners[k], corners[(k + 1) % 3]));
         let face = FlatFace::from_sides(sides);
-        let at = |(k, s): OnSide| -> [f64; 2] {
+        let at = |(k, [s, _]): OnSide| -> [f64; 2] {
             let (p, q) = (corners[k], corners[(k + 1) % 3]);
             std::array::from_fn(|i| p[i] + s * (q[i] - p[i]))
         };
-        let points: Vec<OnSide> = (0..12).map(|i| (i % 3, (i / 3) as f64 * 0.3)).collect();
+        let points: Vec<OnSide> = (0..12)
+            .map(|i| (i % 3, (i / 3) as f64 * 0.3))
+            .map(|(k, s)| (k, [s, 1.0 - s]))
+            .collect();
         for &p in &points {
             for &q in &points {
                 let d = face.distance(p, q);
                 assert!((d - between(at(p), at(q))).abs() < 1e-14, "{p:?} {q:?}");
                 assert_eq!(d.to_bits(), face.distance(q, p).to_bits());
             }
+        }
+    }
+
+    /// Seen from either side of an edge, what is near one of its ends has the same shape to all digits.
+    #[test]
+    fn near_corners_no_digits_are_lost() {
+        let face = FlatFace::from_sides([1.0, 1.0, 1.0]);
+        for far in [1e-4, 1e-8, 1e-12] {
+            let (near, next) = ([1.0 - far, far], [1.0 - 3.0 * far, 3.0 * far]);
+            // An equilateral corner: as far from each other as from the corner.
+            let across = face.distance((0, near), (1, [far, 1.0 - far]));
+            assert!((across / far - 1.0).abs() < 1e-14, "{far}: {across}");
+            let along = face.distance((0, near), (0, next));
+            assert!((along / far - 2.0).abs() < 1e-14, "{far}: {along}");
         }
     }
 }

@@ -18,6 +18,9 @@ use crate::geometry::mesh::Mesh;
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
+/// Newton's method takes fifteen steps or so to flatten a quad; one that takes so many is too crowded for float64, and then so are most of the
+/// others, of which each is as much work as the flow of the whole surface.
+const MOST_STEPS: usize = 100;
 /// Largest difference of opposite sides, in widths of the rectangle.
 pub(super) const UNEQUAL: f64 = 1e-8;
 
@@ -77,6 +80,7 @@ pub(super) fn flatten(
     let prescription = Prescription::new(target, BoundaryCondition::Corners);
     let params = FlowParams {
         curvature_tolerance: tolerance,
+        max_newton_steps: MOST_STEPS,
         ..FlowParams::default()
     };
     let metric =
