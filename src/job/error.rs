@@ -148,12 +148,15 @@ impl BuildError {
             BuildError::Chart(ChartError::Develop(_)) => FailureKind::NotConverged,
             BuildError::Patch(PatchError::NotFinite { .. }) => FailureKind::NotConverged,
             BuildError::Patch(_) => FailureKind::Prescription,
-            BuildError::Rectangle(RectangleError::Flow { .. } | RectangleError::Unequal { .. }) => {
-                FailureKind::NotConverged
-            }
+            BuildError::Rectangle(
+                RectangleError::Flow { .. }
+                | RectangleError::Unequal { .. }
+                | RectangleError::Folded { .. },
+            ) => FailureKind::NotConverged,
             BuildError::Rectangle(_) => FailureKind::Internal,
             BuildError::Unverified(_) => FailureKind::Unverified,
             BuildError::Precision(_) => FailureKind::NotConverged,
+            BuildError::Export(ExportError::NotFinite { .. }) => FailureKind::NotConverged,
             BuildError::Export(error) if error.is_internal() => FailureKind::Internal,
             BuildError::Export(_) => FailureKind::Output,
             BuildError::Cancelled => FailureKind::Internal,

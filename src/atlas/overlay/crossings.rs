@@ -153,13 +153,13 @@ impl<'a> Crossings<'a> {
         Ok(Met { index, leaves })
     }
 
-    /// Fraction of a crossing along a base halfedge.
+    /// Fractions of a base halfedge before a crossing and behind it.
     #[inline]
-    pub fn base_fraction(&self, index: usize, base_halfedge: HalfedgeId) -> f64 {
-        let e = self.base.edge(base_halfedge);
-        match self.base.edge_halfedge(e) == base_halfedge {
-            true => self.on_base[index],
-            false => 1.0 - self.on_base[index],
+    pub fn base_fractions(&self, index: usize, base_halfedge: HalfedgeId) -> Fractions {
+        let s = self.on_base[index];
+        match self.base.edge_halfedge(self.base.edge(base_halfedge)) == base_halfedge {
+            true => [s, 1.0 - s],
+            false => [1.0 - s, s],
         }
     }
 

@@ -20,8 +20,8 @@ use crate::geometry::mesh::distance;
 pub struct OnBase {
     /// Side, from the base corner where it begins.
     pub side: u8,
-    /// Fraction along it; 0 at the corner.
-    pub fraction: f64,
+    /// Fractions of it before the corner of the overlay and behind it; 0 and 1 at the corner where it begins.
+    pub fractions: Fractions,
 }
 
 /// What lies under final edges.
@@ -151,7 +151,7 @@ impl Regions {
             let under = inputs.ground.under(x, border[k], 0).ok_or_else(error)?;
             self.on_base.push(OnBase {
                 side: k as u8,
-                fraction: 0.0,
+                fractions: [0.0, 1.0],
             });
             self.carrier.push(Carrier {
                 halfedge: under.halfedge,
@@ -187,7 +187,7 @@ impl Regions {
             crossing: None,
             on_base: OnBase {
                 side: 0,
-                fraction: 0.0,
+                fractions: [0.0, 1.0],
             },
             border: HalfedgeId::new(0),
             fractions: [0.0, 1.0],
@@ -220,7 +220,7 @@ impl Regions {
             }
             corners[i].vertex = VertexId::new(vertex as usize);
             corners[i].crossing = Some(met.index);
-            corners[i].on_base.fraction = x.base_fraction(met.index, halfedge(p));
+            corners[i].on_base.fractions = x.base_fractions(met.index, halfedge(p));
             corners[i].border = border;
             corners[i].fractions = x.fractions(met.index, border);
         }

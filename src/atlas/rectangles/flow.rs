@@ -107,16 +107,16 @@ pub(super) fn flatten(
     } = overlay::overlay(mesh, metric, prescription)?;
     let fine = &mesh.connectivity;
     // Base faces, and where on them the corners lie.
-    let base = |h: HalfedgeId| -> (HalfedgeId, f64) {
+    let base = |h: HalfedgeId| -> (HalfedgeId, [f64; 2]) {
         let f = mesh.source_face[fine.face(h)] as usize;
-        let OnBase { side, fraction } = match &on_base {
+        let OnBase { side, fractions } = match &on_base {
             Some(on_base) => on_base[h],
             None => OnBase {
                 side: fine.corner(h) as u8,
-                fraction: 0.0,
+                fractions: [0.0, 1.0],
             },
         };
-        (HalfedgeId::new(3 * f + usize::from(side)), fraction)
+        (HalfedgeId::new(3 * f + usize::from(side)), fractions)
     };
     let loops = fine.boundary_loops();
     let [border] = &loops[..] else {
@@ -125,7 +125,7 @@ pub(super) fn flatten(
         });
     };
     let piece = |&h: &HalfedgeId| {
-        let (along, from) = base(h);
+        let (along, [from, _]) = base(h);
         Piece {
             wall: disk.halfedge(drawing, along),
             edge: fine.edge(h),
@@ -148,11 +148,11 @@ pub(super) fn flatten(
         });
     }
     let corner = |h: HalfedgeId| {
-        let (along, t) = base(h);
+        let (along, [before, behind]) = base(h);
         let k = along.index() % 3;
         let mut weights = [0.0; 3];
-        weights[k] = 1.0 - t;
-        weights[(k + 1) % 3] += t;
+        weights[k] = behind;
+        weights[(k + 1) % 3] = before;
         Corner {
             weights,
             uv: [0.0; 2],
