@@ -141,6 +141,10 @@ impl BuildError {
             BuildError::Flow(FlowError::BadLength { .. }) => FailureKind::Input,
             BuildError::Flow(_) | BuildError::Develop(_) => FailureKind::NotConverged,
             BuildError::Overlay(OverlayError::TooManyCrossings { .. }) => FailureKind::Input,
+            BuildError::Rectangle(
+                RectangleError::TooManyPieces { .. }
+                | RectangleError::Overlay(OverlayError::TooManyCrossings { .. }),
+            ) => FailureKind::Input,
             BuildError::Overlay(_) => FailureKind::Internal,
             BuildError::Cut(CutError::NothingToCutAlong) => FailureKind::Prescription,
             BuildError::Cut(_) => FailureKind::Internal,

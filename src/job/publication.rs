@@ -101,7 +101,9 @@ impl<'a> Publication<'a> {
                 staging.withdraw(&subfolder)?;
                 return Ok(Err(error.into()));
             }
-            written => written?,
+            written => {
+                written?;
+            }
         }
         go_on()?;
         observer.stage("verify", component, components);
