@@ -86,7 +86,7 @@ type Mesh = fn() -> (shapes::Points, shapes::Faces);
 
 /// Files below a megabyte that once cost more than they may, or are of a kind that could.
 /// With what the message must say where they cannot be built.
-const GENERATED: [(&str, Mesh, &str); 14] = [
+const GENERATED: [(&str, Mesh, &str); 13] = [
     ("fan", || shapes::fan(2000), ""),
     ("polygon", || shapes::polygon(3000), ""),
     (
@@ -94,7 +94,6 @@ const GENERATED: [(&str, Mesh, &str); 14] = [
         || shapes::rounded(shapes::polygon(POLYGON)),
         "",
     ),
-    ("fan-of-nearly-a-megabyte", || shapes::fan(15_500), ""),
     ("bipyramid", || shapes::bipyramid(500), ""),
     ("components", || shapes::tetrahedra(64), ""),
     ("soup", || shapes::soup(900, 3000), ""),

@@ -2,7 +2,7 @@
 //!
 //! *Guaranteed:* full relative accuracy for any shape and any scale, since only differences along a side are ever taken: with a, b
 //! the distances of two points from the corner between their sides, d² = (a − b)² + 4 sin²(θ/2) ab. Points near either end of a side keep their
-//! digits, since both fractions are given: one of them is exact, and the rest of a side that is nearly 1 is not taken from it.
+//! digits, since both fractions are given, of which the smaller one is exact; and a − b is taken with what rounding has left off of a and b.
 
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceId};
@@ -40,13 +40,31 @@ impl FlatFace {
         if p.0 == q.0 {
             // From the end that both are near to, if there is one.
             let end = usize::from(p.1[0].min(q.1[0]) > 0.5);
-            return (q.1[end] - p.1[end]).abs() * self.side[p.0];
+            let [from, to] = [p, q].map(|x| (x.1[end], rest(x.1[end], x.1[1 - end])));
+            return ((to.0 - from.0) + (to.1 - from.1)).abs() * self.side[p.0];
         }
         // Let q be on the side after p's, so that they meet at the corner where q's side begins.
         let (p, q) = if q.0 == (p.0 + 1) % 3 { (p, q) } else { (q, p) };
-        let (a, b) = (p.1[1] * self.side[p.0], q.1[0] * self.side[q.0]);
-        (a - b).hypot((self.opening[q.0] * a).sqrt() * b.sqrt())
+        let (a, a_rest) = part([p.1[1], p.1[0]], self.side[p.0]);
+        let (b, b_rest) = part(q.1, self.side[q.0]);
+        // In a needle both are long and their difference is not.
+        let apart = (a - b) + (a_rest - b_rest);
+        apart.hypot((self.opening[q.0] * a).sqrt() * b.sqrt())
     }
+}
+
+/// What rounding has taken from a fraction; `other` is the rest of the side. The smaller one of both is exact.
+fn rest(own: f64, other: f64) -> f64 {
+    match own > 0.5 {
+        true => (1.0 - own) - other,
+        false => 0.0,
+    }
+}
+
+/// A part of a side, and what rounding has taken from it.
+fn part([own, other]: Fractions, side: f64) -> (f64, f64) {
+    let length = own * side;
+    (length, own.mul_add(side, -length) + rest(own, other) * side)
 }
 
 #[cfg(test)]
@@ -74,6 +92,23 @@ mod tests {
                 assert!((d - between(at(p), at(q))).abs() < 1e-14, "{p:?} {q:?}");
                 assert_eq!(d.to_bits(), face.distance(q, p).to_bits());
             }
+        }
+    }
+
+    /// Across a needle, far from its tip, distances are small differences of long ones.
+    #[test]
+    fn needles_have_all_digits_too() {
+        let width = 2.0_f64.powi(-30);
+        let face = FlatFace::from_sides([1.0, width, 1.0]);
+        // A third of the way to the tip, which is corner 0, and a little farther on the other side.
+        let s = 1.0 / 3.0;
+        for step in [1e-9, 1e-12, 1e-15] {
+            let t = s + step;
+            // What t really is.
+            let step = t - s;
+            let found = face.distance((0, [s, 1.0 - s]), (2, [1.0 - t, t]));
+            let expected = step.hypot(width * (s * t).sqrt());
+            assert!((found / expected - 1.0).abs() < 1e-15, "{found} {expected}");
         }
     }
 

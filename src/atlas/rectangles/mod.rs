@@ -151,12 +151,12 @@ pub enum RectangleError {
     },
     /// Lines between rectangles cross the faces of the mesh far more often than its size makes believe.
     #[error(
-        "lines between rectangles cut the {faces} faces of this mesh into {pieces} pieces (most: {most}), since very many long thin faces lie side by side; use images.domain = \"flat\", or divide the long faces, or remesh the surface with faces of similar sides"
+        "lines between rectangles cut the {faces} faces of this surface into {pieces} pieces (most: {most}), since very many long thin faces lie side by side; use images.domain = \"flat\", or divide the long faces, or remesh the surface with faces of similar sides"
     )]
     TooManyPieces {
         /// Pieces so far.
         pieces: usize,
-        /// Faces of the mesh.
+        /// Faces of the surface.
         faces: usize,
         /// How many there may be.
         most: usize,

@@ -24,9 +24,9 @@ const SNAP: f64 = 0.1;
 const CREASE: f64 = 0.5;
 
 /// Most pieces of a face, on the mean: lines cross about as many faces of an ordinary mesh as lie on a way across it.
-const MOST_PIECES: usize = 16;
+const MOST_PIECES: usize = 8;
 /// So many more are allowed, whatever the number of faces: lines on a few faces cross all of them.
-const ALLOWED_PIECES: usize = 60_000;
+const ALLOWED_PIECES: usize = 30_000;
 
 /// What a vertex is to the quads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
