@@ -20,7 +20,7 @@ use std::ops::Range;
 
 /// Newton's method takes fifteen steps or so to flatten a quad; one that takes so many is too crowded for float64, and then so are most of the
 /// others, of which each is as much work as the flow of the whole surface.
-const MOST_STEPS: usize = 100;
+const MOST_STEPS: usize = 60;
 /// Largest difference of opposite sides, in widths of the rectangle.
 pub(super) const UNEQUAL: f64 = 1e-8;
 

@@ -24,7 +24,7 @@ const SNAP: f64 = 0.1;
 const CREASE: f64 = 0.5;
 
 /// Most pieces of a face, on the mean: lines cross about as many faces of an ordinary mesh as lie on a way across it.
-const MOST_PIECES: usize = 8;
+const MOST_PIECES: usize = 5;
 /// So many more are allowed, whatever the number of faces: lines on a few faces cross all of them.
 const ALLOWED_PIECES: usize = 30_000;
 
