@@ -1,14 +1,14 @@
 //! The whole program on real models, checked by code that shares nothing with it.
 //!
 //! `AFFINE_ATLAS_CORPUS` names a folder with the models (`dirty/` and `gltf/` below it); without it every case is
-//! reported as ignored. `AFFINE_ATLAS_CHECKER` names an independent checker of output folders (a
+//! reported as ignored. Large models with other settings than the defaults are for `--ignored`. `AFFINE_ATLAS_CHECKER` names an independent checker of output folders (a
 //! Python script, run by `AFFINE_ATLAS_PYTHON` or `python3`); without it only the program's own `verify` is asked.
 
 mod real_models;
 
 use libtest_mimic::{Arguments, Failed, Trial};
 use real_models::watertight::watertight;
-use real_models::{CLEAN, checked, comparable, succeed};
+use real_models::{CLEAN, LARGE, atlases, checked, comparable, succeed};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -40,29 +40,35 @@ fn main() {
     let arguments = Arguments::from_args();
     let corpus = std::env::var_os("AFFINE_ATLAS_CORPUS").map(PathBuf::from);
     let mut trials = Vec::new();
-    let mut add = |name: String, run: Case| {
+    let mut add = |name: String, is_long: bool, run: Case| {
         let folder = corpus.clone();
         let trial = Trial::test(name, move || match folder {
             Some(folder) => run(&folder),
             None => Err("AFFINE_ATLAS_CORPUS names no folder".into()),
         });
-        trials.push(trial.with_ignored_flag(corpus.is_none()));
+        trials.push(trial.with_ignored_flag(is_long || corpus.is_none()));
     };
     // The longest are among these: first, so that no core waits for them in the end.
     for folder in ["dirty", "gltf"] {
         for file in corpus.iter().flat_map(|c| models(&c.join(folder))) {
             let name = file.file_name().unwrap_or_default().to_string_lossy();
             let name = format!("{folder}/{name}");
-            add(name, Box::new(move |_: &Path| atlas_or_refusal(&file)));
+            add(
+                name,
+                false,
+                Box::new(move |_: &Path| atlas_or_refusal(&file)),
+            );
         }
     }
     for (file, genus, loops) in CLEAN {
+        let is_large = LARGE.contains(&file);
         for (name, settings) in [("clean", DEFAULTS), ("tangential", TANGENTIAL)] {
             let run = move |corpus: &Path| clean(&corpus.join(file), genus, loops, settings);
-            add(format!("{name}/{file}"), Box::new(run));
+            let is_long = is_large && !settings.is_empty();
+            add(format!("{name}/{file}"), is_long, Box::new(run));
         }
         let run = move |corpus: &Path| seamless(&corpus.join(file), genus, loops);
-        add(format!("seamless/{file}"), Box::new(run));
+        add(format!("seamless/{file}"), is_large, Box::new(run));
     }
     for (file, curvature) in [
         ("brezel.obj", "-4"),
@@ -75,11 +81,15 @@ fn main() {
             ("thurston-cone", THURSTON),
         ] {
             let run = move |corpus: &Path| single_cone(&corpus.join(file), curvature, settings);
-            add(format!("{name}/{file}"), Box::new(run));
+            add(format!("{name}/{file}"), false, Box::new(run));
         }
     }
-    add("rocker-arm/exact-lengths".into(), Box::new(rocker_arm));
-    add("spot/quarter-turns".into(), Box::new(quarter_turns));
+    add(
+        "rocker-arm/exact-lengths".into(),
+        false,
+        Box::new(rocker_arm),
+    );
+    add("spot/quarter-turns".into(), false, Box::new(quarter_turns));
     libtest_mimic::run(&arguments, trials).exit();
 }
 
@@ -103,19 +113,8 @@ struct Built {
 }
 
 impl Built {
-    /// Folders that hold an `atlas.json`, by name.
     fn atlases(&self) -> Vec<PathBuf> {
-        let mut found = Vec::new();
-        let mut open = vec![self.folder.path().to_path_buf()];
-        while let Some(folder) = open.pop() {
-            if folder.join("atlas.json").is_file() {
-                found.push(folder.clone());
-            }
-            let entries = std::fs::read_dir(&folder).into_iter().flatten().flatten();
-            open.extend(entries.map(|e| e.path()).filter(|p| p.is_dir()));
-        }
-        found.sort();
-        found
+        atlases(self.folder.path())
     }
 }
 

@@ -9,13 +9,13 @@ mod arrays;
 mod command;
 
 use arrays::array;
-use command::{Built, build, document, verify};
+use command::{Built, build_small, document, verify};
 use libtest_mimic::{Arguments, Failed, Trial};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// No atlas of a mesh this small may take longer.
+/// No atlas of a mesh this small, with small images, may take longer.
 const LIMIT: Duration = Duration::from_secs(10);
 
 fn main() {
@@ -89,7 +89,7 @@ impl Mesh {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("mesh.obj");
         std::fs::write(&path, self.obj()).expect("written");
-        build(&path, settings)
+        build_small(&path, settings)
     }
 
     fn diagonal(&self) -> f64 {

@@ -1,7 +1,9 @@
 //! Spline surfaces of real models, and of a fixture beside those of SciPy.
 //!
 //! `AFFINE_ATLAS_CORPUS` names a folder with the models, `AFFINE_ATLAS_PYTHON` (or `python3`) an interpreter with SciPy and
-//! OpenEXR; what is missing is reported as ignored.
+//! OpenEXR; what is missing is reported as ignored. Large models are for `--ignored`.
+
+mod real_models;
 
 use affine_atlas::config::Config;
 use affine_atlas::fit::DEFAULT_SPACING;
@@ -9,6 +11,7 @@ use affine_atlas::job::fit::{FitParams, FittedComponent};
 use affine_atlas::outcome::AssetState;
 use affine_atlas::{atlas::patches::Domain, job};
 use libtest_mimic::{Arguments, Failed, Trial};
+use real_models::LARGE;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -39,7 +42,7 @@ fn main() {
     for (file, euler) in MODELS {
         let model = folder.join(file);
         let trial = Trial::test(format!("joined/{file}"), move || joined(&model, euler));
-        trials.push(trial.with_ignored_flag(is_ignored));
+        trials.push(trial.with_ignored_flag(is_ignored || LARGE.contains(&file)));
     }
     let scipy = Trial::test("scipy/genus-2-amphora", beside_scipy);
     trials.push(scipy.with_ignored_flag(!has_scipy()));

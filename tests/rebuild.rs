@@ -2,7 +2,7 @@
 //! rate that exact sampling gives. (Whether those of default builds are watertight is asked in `corpus`, which has them.)
 //!
 //! `AFFINE_ATLAS_CORPUS` names a folder with the models; without it every case is reported as ignored. `AFFINE_ATLAS_CHECKER` names an
-//! independent checker, which is asked about rectangles and texels on a lattice.
+//! independent checker, which is asked about rectangles and texels on a lattice. Large models are for `--ignored`.
 
 mod real_models;
 
@@ -18,7 +18,7 @@ use affine_atlas::rebuild::{Images, rebuild};
 use affine_atlas::{build, job};
 use libtest_mimic::{Arguments, Failed, Trial};
 use real_models::watertight::watertight;
-use real_models::{CLEAN, checked, comparable};
+use real_models::{CLEAN, LARGE, checked, comparable};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
@@ -54,8 +54,13 @@ fn main() {
     let corpus = std::env::var_os("AFFINE_ATLAS_CORPUS").map(PathBuf::from);
     let is_ignored = corpus.is_none();
     let folder = corpus.unwrap_or_default();
+    let is_long = |file: &str| is_ignored || LARGE.contains(&file);
     // The longest comes first, so that no core waits for it in the end.
-    let mut trials = vec![Trial::test("order/smooth", smooth)];
+    let mut trials = vec![
+        Trial::test("order/smooth/720", || smooth(720, &[64, 128, 256])).with_ignored_flag(true),
+        Trial::test("order/smooth/360", || smooth(360, &[32, 64, 128]))
+            .with_ignored_flag(is_ignored),
+    ];
     for (file, genus, loops) in CLEAN {
         // At 512², the default, the atlases of `corpus` are asked.
         let flat = [256, 64].map(|side| (Texels::Flat, side));
@@ -64,18 +69,18 @@ fn main() {
             let model = folder.join(file);
             let run = move || built(&model, texels, side, genus, loops);
             let name = format!("watertight/{texels:?}/{side}/{file}");
-            trials.push(Trial::test(name, run));
+            trials.push(Trial::test(name, run).with_ignored_flag(is_long(file)));
         }
     }
     for file in PIECEWISE_LINEAR {
         let model = folder.join(file);
-        trials.push(Trial::test(format!("order/{file}"), move || {
+        let trial = Trial::test(format!("order/{file}"), move || {
             let soup = read(&model, &ReadParams::default())?.soup;
             order(file, &soup, &[64, 128, 256, 512], 1.4)
-        }));
+        });
+        trials.push(trial.with_ignored_flag(is_long(file)));
     }
-    let trials = trials.into_iter().map(|t| t.with_ignored_flag(is_ignored));
-    libtest_mimic::run(&arguments, trials.collect()).exit();
+    libtest_mimic::run(&arguments, trials).exit();
 }
 
 /// The mesh rebuilt from the images of one build.
@@ -182,9 +187,8 @@ fn order(name: &str, soup: &Soup, sides: &[usize], least: f64) -> Result<(), Fai
     }
 }
 
-/// A torus with bumps of more than half a million vertices: smooth as far as texels can tell.
-fn smooth() -> Result<(), Failed> {
-    let n = 720u32;
+/// A torus with bumps of n² vertices, many to a texel: smooth as far as texels can tell.
+fn smooth(n: u32, sides: &[usize]) -> Result<(), Failed> {
     let mut positions = Vec::new();
     let mut faces = Vec::new();
     for i in 0..n {
@@ -214,5 +218,5 @@ fn smooth() -> Result<(), Failed> {
         positions.len()
     );
     let soup = Soup::from_triangles(positions, faces);
-    order("smooth", &soup, &[64, 128, 256], 1.8)
+    order("smooth", &soup, sides, 1.8)
 }

@@ -1,10 +1,13 @@
 //! Textures of real models: no seam shows where all transitions are quarter turns.
 //!
-//! `AFFINE_ATLAS_CORPUS` names a folder with the models; without it they are reported as ignored.
+//! `AFFINE_ATLAS_CORPUS` names a folder with the models; without it they are reported as ignored. Large ones are for `--ignored`.
+
+mod real_models;
 
 use affine_atlas::job::texture::{TextureParams, TileSize, texture};
 use affine_atlas::texture::{as_it_is, paint, steps};
 use libtest_mimic::{Arguments, Failed, Trial};
+use real_models::LARGE;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -32,7 +35,8 @@ fn main() {
     let trials = MODELS.map(|(file, settings)| {
         let model = folder.join(file);
         let name = format!("{file}/{}", settings.join(","));
-        Trial::test(name, move || seamless(&model, settings)).with_ignored_flag(is_ignored)
+        let is_long = is_ignored || LARGE.contains(&file);
+        Trial::test(name, move || seamless(&model, settings)).with_ignored_flag(is_long)
     });
     libtest_mimic::run(&arguments, trials.into()).exit();
 }

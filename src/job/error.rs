@@ -141,6 +141,10 @@ impl BuildError {
             BuildError::Flow(FlowError::BadLength { .. }) => FailureKind::Input,
             BuildError::Flow(_) | BuildError::Develop(_) => FailureKind::NotConverged,
             BuildError::Overlay(OverlayError::TooManyCrossings { .. }) => FailureKind::Input,
+            BuildError::Rectangle(
+                RectangleError::TooManyPieces { .. }
+                | RectangleError::Overlay(OverlayError::TooManyCrossings { .. }),
+            ) => FailureKind::Input,
             BuildError::Overlay(_) => FailureKind::Internal,
             BuildError::Cut(CutError::NothingToCutAlong) => FailureKind::Prescription,
             BuildError::Cut(_) => FailureKind::Internal,
@@ -148,12 +152,15 @@ impl BuildError {
             BuildError::Chart(ChartError::Develop(_)) => FailureKind::NotConverged,
             BuildError::Patch(PatchError::NotFinite { .. }) => FailureKind::NotConverged,
             BuildError::Patch(_) => FailureKind::Prescription,
-            BuildError::Rectangle(RectangleError::Flow { .. } | RectangleError::Unequal { .. }) => {
-                FailureKind::NotConverged
-            }
+            BuildError::Rectangle(
+                RectangleError::Flow { .. }
+                | RectangleError::Unequal { .. }
+                | RectangleError::Folded { .. },
+            ) => FailureKind::NotConverged,
             BuildError::Rectangle(_) => FailureKind::Internal,
             BuildError::Unverified(_) => FailureKind::Unverified,
             BuildError::Precision(_) => FailureKind::NotConverged,
+            BuildError::Export(ExportError::NotFinite { .. }) => FailureKind::NotConverged,
             BuildError::Export(error) if error.is_internal() => FailureKind::Internal,
             BuildError::Export(_) => FailureKind::Output,
             BuildError::Cancelled => FailureKind::Internal,

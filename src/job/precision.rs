@@ -28,6 +28,10 @@ const SLIVER: f64 = 1e-6;
 /// Log scales this far apart leave the smallest parts of the atlas less than eight digits beside the largest.
 const APART: f64 = 18.0;
 
+/// Faces this small, as a part of the chart, have sides that its coordinates hold with eight digits at the most, less what laying out all the
+/// faces between has added up to.
+const TINY: f64 = 1e-8;
+
 /// An atlas that float64 does not hold.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
@@ -97,13 +101,20 @@ pub enum Cause {
     },
 }
 
+impl Cause {
+    fn is_tiny(&self) -> bool {
+        matches!(self, Cause::Apart { size, .. } if *size < TINY)
+    }
+}
+
 impl Precision {
     /// What float64 does not hold of an atlas that fails these checks; `None` where nothing is beyond it.
     pub(super) fn of(verdicts: &Verdicts, atlas: &AffineAtlas, soup: &Soup) -> Option<Self> {
         let cause = thin(atlas, soup)
             .or_else(|| small(atlas, soup))
-            .or_else(|| apart(atlas))
-            .or_else(|| sliver(atlas))?;
+            .or_else(|| apart(atlas, APART))
+            .or_else(|| sliver(atlas))
+            .or_else(|| apart(atlas, 0.0).filter(Cause::is_tiny))?;
         let failed = failed_of(verdicts);
         Some(Self {
             failed: failed.len(),
@@ -179,7 +190,7 @@ fn sliver(atlas: &AffineAtlas) -> Option<Cause> {
     Some(Cause::Sliver { face, width, faces })
 }
 
-fn apart(atlas: &AffineAtlas) -> Option<Cause> {
+fn apart(atlas: &AffineAtlas, bound: f64) -> Option<Cause> {
     let scales = atlas.metric.log_scale.iter();
     let (low, high) = scales.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &u| {
         (low.min(u), high.max(u))
@@ -192,5 +203,5 @@ fn apart(atlas: &AffineAtlas) -> Option<Cause> {
         .zip(atlas.mesh.source_face.iter())
         .map(|(corners, &face)| (face, diameter(corners.iter().copied()) / whole));
     let (face, size, _) = least(sizes, f64::INFINITY)?;
-    (range > APART).then_some(Cause::Apart { range, face, size })
+    (range > bound).then_some(Cause::Apart { range, face, size })
 }

@@ -95,7 +95,16 @@ impl<'a> Publication<'a> {
             asset: self.id,
         };
         observer.stage("write", component, components);
-        export::write_component(staging, &subfolder, atlas, &provenance)?;
+        match export::write_component(staging, &subfolder, atlas, &provenance) {
+            // The fault is in this component alone.
+            Err(error @ ExportError::NotFinite { .. }) => {
+                staging.withdraw(&subfolder)?;
+                return Ok(Err(error.into()));
+            }
+            written => {
+                written?;
+            }
+        }
         go_on()?;
         observer.stage("verify", component, components);
         let written = staging.path().join(&subfolder);

@@ -1,6 +1,7 @@
 //! The automatic choice of cones: better than what other tools choose, near the best there is, and the same whatever does not matter.
 //!
-//! `AFFINE_ATLAS_CORPUS` names a folder of real models; without it, cases that need one are reported as ignored. With
+//! `AFFINE_ATLAS_CORPUS` names a folder of real models; without it, cases that need one are reported as ignored, and some large models are for
+//! `--ignored` anyway. With
 //! `--nocapture`, every case prints the rows that `benches/README.md` shows.
 
 #[path = "../../benches/common/mod.rs"]
@@ -14,11 +15,14 @@ mod models;
 mod optimality;
 mod peers;
 mod quantum;
+#[path = "../real_models/mod.rs"]
+mod real_models;
 mod stability;
 mod symmetry;
 
 use affine_atlas::flow::cones::BoundaryCondition;
 use libtest_mimic::{Arguments, Failed, Trial};
+use real_models::LARGE;
 use std::path::{Path, PathBuf};
 
 /// The clean models.
@@ -63,8 +67,8 @@ const STABLE: [(&str, BoundaryCondition); 10] = [
     ("face.obj", BoundaryCondition::Free),
     ("face.obj", BoundaryCondition::Uniform),
 ];
-/// Subdivided, they take a minute each: for `--ignored`.
-const SLOW: [&str; 2] = ["nefertiti.obj", "kitten.obj"];
+/// Subdivided, they take half a minute or more each: for `--ignored`.
+const SLOW: [&str; 3] = ["nefertiti.obj", "kitten.obj", "bumpy-cube.obj"];
 /// Small ones with and without handles and boundary.
 const VARIED: [&str; 5] = [
     "spot.obj",
@@ -105,7 +109,9 @@ fn main() {
     trials.push(trial("limits/curvatures".into(), corpus.clone(), case));
     for model in MODELS {
         let case = move |corpus: &Path| defaults::beside_spread(&corpus.join(model));
-        trials.push(trial(format!("default/{model}"), corpus.clone(), case));
+        let is_long = LARGE.contains(&model) || corpus.is_none();
+        let trial = trial(format!("default/{model}"), corpus.clone(), case);
+        trials.push(trial.with_ignored_flag(is_long));
     }
     for model in [
         "spot.obj",

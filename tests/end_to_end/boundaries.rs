@@ -1,7 +1,7 @@
 //! Prescribed boundaries: rectangles, uniform curvature, single vertices.
 
 use crate::arrays::array;
-use crate::command::{build, document, verify};
+use crate::command::{build_small, document, verify};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
@@ -139,7 +139,7 @@ fn assert_rectangle(atlas: &Path) {
 /// Three corners of π/3 each are an equilateral triangle, whatever the disk; a fourth listed vertex of 0 changes nothing.
 #[test]
 fn a_disk_becomes_an_equilateral_triangle() {
-    let rim = rim(&build(&disk(), &[]).atlas());
+    let rim = rim(&build_small(&disk(), &[]).atlas());
     let at = |i: usize| rim[i * rim.len() / 5];
     let list = format!(
         "boundary.list=[{{vertex={},curvature=\"2/3\"}},{{vertex={},curvature=\"2/3\"}},{{vertex={},curvature=\"2/3\"}},{{vertex={},curvature=0}}]",
@@ -148,7 +148,7 @@ fn a_disk_becomes_an_equilateral_triangle() {
         at(3),
         at(4)
     );
-    let built = build(&disk(), &[&list]);
+    let built = build_small(&disk(), &[&list]);
     verify(&built.atlas());
     assert_eq!(document(&built.atlas())["metric"]["boundary"], "prescribed");
     let sides = sides(&built.atlas());
@@ -165,12 +165,12 @@ fn a_disk_becomes_an_equilateral_triangle() {
 /// One corner of π/2 is listed, and a dent of −π/3; all others turn by the same, so that the whole is 2π.
 #[test]
 fn boundary_vertices_that_are_not_listed_share_the_rest() {
-    let rim = rim(&build(&disk(), &[]).atlas());
+    let rim = rim(&build_small(&disk(), &[]).atlas());
     let (corner, dent) = (rim[0], rim[rim.len() / 2]);
     let list = format!(
         "boundary.list=[{{vertex={corner},curvature=0.5}},{{vertex={dent},curvature=\"-1/3\"}}]"
     );
-    let built = build(&disk(), &[&list]);
+    let built = build_small(&disk(), &[&list]);
     let atlas = built.atlas();
     verify(&atlas);
     let source: Vec<u32> = array(&atlas, "source_vertex");
@@ -190,13 +190,13 @@ fn boundary_vertices_that_are_not_listed_share_the_rest() {
 #[test]
 fn a_disk_becomes_a_rectangle_with_the_corners_given() {
     // Four boundary vertices of the file, found from a build with a free boundary.
-    let free = build(&disk(), &[]);
+    let free = build_small(&disk(), &[]);
     let rim = rim(&free.atlas());
     let given: Vec<u32> = (0..4).map(|i| rim[i * (rim.len() / 4)]).collect();
     let tables: Vec<String> = given.iter().map(|v| format!("{{vertex={v}}}")).collect();
     let corners = format!("boundary.corners=[{}]", tables.join(","));
 
-    let built = build(&disk(), &["boundary.condition=corners", &corners]);
+    let built = build_small(&disk(), &["boundary.condition=corners", &corners]);
     let atlas = built.atlas();
     verify(&atlas);
     let source: Vec<u32> = array(&atlas, "source_vertex");
@@ -218,7 +218,7 @@ fn a_disk_becomes_a_rectangle_with_the_corners_given() {
 
 #[test]
 fn corners_are_chosen_where_none_are_given() {
-    let built = build(&disk(), &["boundary.condition=corners"]);
+    let built = build_small(&disk(), &["boundary.condition=corners"]);
     verify(&built.atlas());
     let turns = turns(&outline(&built.atlas()));
     let corners = turns
@@ -234,7 +234,7 @@ fn corners_are_chosen_where_none_are_given() {
 #[test]
 fn a_rectangle_of_circles() {
     let corners = ["boundary.condition=corners", "flow.scheme=tangential"];
-    let built = build(&disk(), &corners);
+    let built = build_small(&disk(), &corners);
     verify(&built.atlas());
     assert_rectangle(&built.atlas());
 }
@@ -247,7 +247,7 @@ fn real_disks_become_rectangles() {
         return;
     };
     for name in ["face.obj", "lilium.obj"] {
-        let built = build(
+        let built = build_small(
             &Path::new(&corpus).join(name),
             &["boundary.condition=corners"],
         );
@@ -259,7 +259,7 @@ fn real_disks_become_rectangles() {
 /// Fig. 9: the same curvature at each of the m boundary vertices of the file, 2π together.
 #[test]
 fn a_uniform_boundary_turns_the_same_everywhere() {
-    let built = build(&disk(), &["boundary.condition=uniform"]);
+    let built = build_small(&disk(), &["boundary.condition=uniform"]);
     verify(&built.atlas());
     let source: Vec<u32> = array(&built.atlas(), "source_vertex");
     let share = 2.0 * PI / rim(&built.atlas()).len() as f64;
@@ -274,7 +274,7 @@ fn a_uniform_boundary_turns_the_same_everywhere() {
 #[test]
 fn cones_inside_a_rectangle() {
     let cones = "cones.list=[{vertex=1100,curvature=\"1/3\"},{point=[0,0,9],curvature=\"-1/3\"}]";
-    let built = build(&disk(), &["boundary.condition=corners", cones]);
+    let built = build_small(&disk(), &["boundary.condition=corners", cones]);
     let atlas = built.atlas();
     verify(&atlas);
     let document = document(&atlas);
@@ -294,7 +294,7 @@ fn cones_inside_a_rectangle() {
 fn totals_loop_by_loop() {
     let rabbit = Path::new("fixtures/good/three-boundaries-rabbit.ply");
     let totals = "boundary.totals=[0,\"-1/2\",-1.5]";
-    let built = build(rabbit, &[totals]);
+    let built = build_small(rabbit, &[totals]);
     let atlas = built.atlas();
     verify(&atlas);
     assert_eq!(document(&atlas)["metric"]["boundary"], "uniform");
@@ -302,11 +302,11 @@ fn totals_loop_by_loop() {
     let sum: f64 = target.iter().sum();
     assert!((sum + 2.0 * PI).abs() < 1e-9, "{sum}");
     let too_little = "boundary.totals=[0,\"-1/2\",-1]";
-    let missed = build(rabbit, &[too_little, "cones.strategy=none"]);
+    let missed = build_small(rabbit, &[too_little, "cones.strategy=none"]);
     assert_eq!(missed.code(), Some(1));
     insta::assert_snapshot!(missed.message(), @"failed: three-boundaries-rabbit (prescription): the prescribed curvatures sum to -1.5π (-4.712388980 rad), but Gauss–Bonnet requires 2πχ = -2π (-6.283185307 rad) on a surface with χ = -1 (genus 0, 3 boundary loops): change the total by -0.5π");
     // Unless cones are ruled out, one takes what is missing.
-    let filled = build(rabbit, &[too_little]);
+    let filled = build_small(rabbit, &[too_little]);
     verify(&filled.atlas());
     let target: Vec<f64> = array(&filled.atlas(), "target_curvature");
     let sum: f64 = target.iter().sum();

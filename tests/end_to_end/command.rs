@@ -30,7 +30,13 @@ pub fn build(mesh: &Path, settings: &[&str]) -> Built {
     Built { folder, output }
 }
 
-/// The same into a given folder.
+/// The same with small images and without a page, for tests of what comes before these.
+pub fn build_small(mesh: &Path, settings: &[&str]) -> Built {
+    let small = ["patches.texel_budget=4096", "report.enabled=false"];
+    build(mesh, &[&small, settings].concat())
+}
+
+/// As `build`, into a given folder.
 pub fn build_into(folder: &Path, mesh: &Path, settings: &[&str]) -> Output {
     let mut command = program();
     command.arg("build").arg("--quiet").arg(mesh);

@@ -1,6 +1,6 @@
 //! Circle packings that cannot exist: what `check` and `build` say of them, and the picture of the region.
 
-use crate::command::{build, program};
+use crate::command::{build_small, program};
 use std::path::Path;
 
 const PRETZEL: &str = "fixtures/good/genus-3-pretzel.obj";
@@ -40,7 +40,7 @@ fn without_repair_the_region_is_named_and_drawn() {
     assert_eq!(code, Some(1), "{said}");
     insta::assert_snapshot!(verdict(&said), @"refused: no circle packing exists: vertex 2577 must have more than -4π of curvature by (6), but -8π is prescribed; let connectivity repair split edges there (connectivity.enabled = true), move the cones, or use the scheme `vertex-scaling` with flow.delaunay = true");
     // The build refuses in the same words.
-    let built = build(Path::new(PRETZEL), &settings);
+    let built = build_small(Path::new(PRETZEL), &settings);
     assert_eq!(built.code(), Some(1));
     let reason = verdict(&said).trim_start_matches("refused: ").to_owned();
     assert!(built.message().contains(&reason), "{}", built.message());

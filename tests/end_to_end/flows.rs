@@ -1,7 +1,7 @@
 //! Schemes and solvers.
 
 use crate::arrays::array;
-use crate::command::{build, document, verify};
+use crate::command::{build_small, document, verify};
 use std::path::Path;
 
 fn fixture(name: &str) -> std::path::PathBuf {
@@ -33,8 +33,8 @@ fn line_by_hand() {
 /// Newton and the gradient flow meet at the same u, and the error of the second decays exponentially (Fig. 7).
 fn solvers_agree(name: &str, scheme: &str, cones: &str) {
     let scheme = &format!("flow.scheme={scheme}");
-    let newton = build(&fixture(name), &["flow.solver=newton", scheme, cones]);
-    let gradient = build(&fixture(name), &["flow.solver=gradient", scheme, cones]);
+    let newton = build_small(&fixture(name), &["flow.solver=newton", scheme, cones]);
+    let gradient = build_small(&fixture(name), &["flow.solver=gradient", scheme, cones]);
     // At the vertices of the file: where edges cross depends on the last flips.
     let log_scale = |atlas: &Path| {
         let u: Vec<f64> = array(atlas, "log_scale");
@@ -97,7 +97,7 @@ fn solvers_agree_on_a_disk() {
 /// No cones on a torus: nothing turns, and the plane is tiled by two period vectors.
 #[test]
 fn a_flat_torus_has_translations_and_two_periods() {
-    let built = build(&fixture("genus-1-mug.off"), &["cones.strategy=none"]);
+    let built = build_small(&fixture("genus-1-mug.off"), &["cones.strategy=none"]);
     let document = document(&built.atlas());
     let segments = document["segments"].as_array().expect("a list");
     assert!(!segments.is_empty());
@@ -130,7 +130,7 @@ fn every_fixture_with(scheme: &str, delaunay: bool, least: usize) {
     let (mut atlases, mut flips) = (0, 0);
     let entries = std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/good"));
     for entry in entries.expect("committed").flatten() {
-        let built = build(&entry.path(), &settings);
+        let built = build_small(&entry.path(), &settings);
         let message = built.message();
         match built.code() {
             Some(0) => {

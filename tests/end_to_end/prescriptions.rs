@@ -1,10 +1,10 @@
 //! Curvature that cannot be prescribed, as the configuration says it.
 
-use crate::command::{build, document, verify};
+use crate::command::{build_small, document, verify};
 use std::path::Path;
 
 fn refusal(fixture: &str, settings: &[&str]) -> String {
-    let built = build(Path::new(&format!("fixtures/good/{fixture}")), settings);
+    let built = build_small(Path::new(&format!("fixtures/good/{fixture}")), settings);
     assert_eq!(built.code(), Some(1), "{}", built.message());
     assert!(built.atlases().is_empty());
     built.message()
@@ -93,7 +93,7 @@ fn a_triangle_inequality_that_breaks_ends_without_an_atlas() {
 #[test]
 fn all_curvature_at_one_vertex_with_flips() {
     let pretzel = Path::new("fixtures/good/genus-3-pretzel.obj");
-    let built = build(pretzel, &["cones.strategy=single"]);
+    let built = build_small(pretzel, &["cones.strategy=single"]);
     verify(&built.atlas());
     let document = document(&built.atlas());
     assert_eq!(document["connectivity"]["splits"], 0);
@@ -122,7 +122,7 @@ fn boundary_vertices_that_cannot_be() {
 fn cones_by_vertex_and_point_and_fraction() {
     let mesh = Path::new("fixtures/bad/unreferenced-vertex.off");
     let list = "cones.list=[{vertex=239,curvature=\"4/3\"},{vertex=8,curvature=1.5},{point=[0.1,-9,0],curvature=\"7/6\"}]";
-    let built = build(mesh, &[list]);
+    let built = build_small(mesh, &[list]);
     let document = document(&built.atlas());
     let cones = document["cones"].as_array().expect("a list");
     let curvature = |vertex: u64| {

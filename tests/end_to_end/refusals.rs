@@ -1,12 +1,12 @@
 //! Every bad fixture is built after repair or refused with its golden message.
 
-use crate::command::{build, document, verify};
+use crate::command::{build_small, document, verify};
 use std::fmt::Write;
 use std::path::Path;
 
 /// Exit code, what became of each component, and the message.
 fn account(name: &str) -> String {
-    let built = build(Path::new(&format!("fixtures/bad/{name}")), &[]);
+    let built = build_small(Path::new(&format!("fixtures/bad/{name}")), &[]);
     let code = built.code().expect("no crash");
     let mut text = format!("{name}: exit {code}\n");
     for atlas in built.atlases() {
@@ -125,7 +125,7 @@ fn every_bad_fixture_is_repaired_or_refused() {
 fn strict_repair_refuses_what_it_would_have_changed() {
     let refusal = |name: &str| {
         let mesh = format!("fixtures/bad/{name}");
-        let built = build(Path::new(&mesh), &["repair.strict=true"]);
+        let built = build_small(Path::new(&mesh), &["repair.strict=true"]);
         assert_eq!(built.code(), Some(1));
         assert!(built.atlases().is_empty());
         built.message()

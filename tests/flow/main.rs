@@ -1,7 +1,7 @@
 //! The flow with flips: that it cannot fail, and that it finds what it should.
 //!
 //! `AFFINE_ATLAS_CORPUS` names a folder of real models; without it, cases that need one are reported as ignored.
-//! `AFFINE_ATLAS_CHECKER` names an independent checker; `reference_u.npz` beside it holds the u of an independent prototype.
+//! Large models are for `--ignored`. `AFFINE_ATLAS_CHECKER` names an independent checker; `reference_u.npz` beside it holds the u of an independent prototype.
 
 mod checked;
 mod invariance;
@@ -14,7 +14,7 @@ mod refinement;
 mod stress;
 
 use libtest_mimic::{Arguments, Failed, Trial};
-use real_models::CLEAN;
+use real_models::{CLEAN, LARGE};
 use std::path::PathBuf;
 
 fn main() {
@@ -24,18 +24,25 @@ fn main() {
     let beside_checker = folder("AFFINE_ATLAS_CHECKER")
         .and_then(|c| c.parent().map(|f| f.join("reference_u.npz")))
         .filter(|f| f.is_file());
+    let is_long = |name: &str| corpus.is_none() || LARGE.contains(&name);
     let mut trials = Vec::new();
     for (name, ..) in CLEAN {
         let file = corpus.as_ref().map(|c| c.join(name));
-        trials.push(trial(format!("prescriptions/{name}"), file, |file| {
-            prescriptions::converge(&file)
-        }));
+        trials.push(
+            trial(format!("prescriptions/{name}"), file, |file| {
+                prescriptions::converge(&file)
+            })
+            .with_ignored_flag(is_long(name)),
+        );
     }
     for (name, ..) in CLEAN {
         let file = corpus.as_ref().map(|c| c.join(name));
-        trials.push(trial(format!("checked/{name}"), file, |file| {
-            checked::first_prescription(&file)
-        }));
+        trials.push(
+            trial(format!("checked/{name}"), file, |file| {
+                checked::first_prescription(&file)
+            })
+            .with_ignored_flag(is_long(name)),
+        );
     }
     for (name, genus) in [
         ("brezel.obj", 2),
@@ -57,7 +64,8 @@ fn main() {
         for (name, ..) in CLEAN {
             let file = corpus.as_ref().map(|c| c.join(name));
             let run = move |file: PathBuf| run(&file);
-            trials.push(trial(format!("stress/{what}/{name}"), file, run));
+            let trial = trial(format!("stress/{what}/{name}"), file, run);
+            trials.push(trial.with_ignored_flag(is_long(name)));
         }
     }
     for name in [

@@ -154,6 +154,12 @@ pub fn polygon(sides: usize) -> (Points, Faces) {
     )
 }
 
+/// With coordinates of nine digits.
+pub fn rounded((points, faces): (Points, Faces)) -> (Points, Faces) {
+    let round = |x: f64| (1e9 * x).round() / 1e9;
+    (points.into_iter().map(|p| p.map(round)).collect(), faces)
+}
+
 pub fn bipyramid(sides: usize) -> (Points, Faces) {
     let tips = [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]];
     let faces = (0..sides).flat_map(|i| {

@@ -5,6 +5,7 @@
 //! permutation, fractions are strictly inside (0, 1) and increase along both edges; anything else is an error.
 
 use super::OverlayError;
+use super::flat_face::Fractions;
 use crate::flow::correspondence::Curves;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeId, HalfedgeId, NONE};
@@ -116,9 +117,16 @@ impl<'a> Crossings<'a> {
     /// Fraction of a crossing along a halfedge of its final edge.
     #[inline]
     pub fn fraction(&self, index: usize, along: HalfedgeId) -> f64 {
+        self.fractions(index, along)[0]
+    }
+
+    /// Fractions of a halfedge of the final edge before a crossing and behind it.
+    #[inline]
+    pub fn fractions(&self, index: usize, along: HalfedgeId) -> Fractions {
+        let s = self.on_flat[index];
         match self.flat.edge_halfedge(self.flat.edge(along)) == along {
-            true => self.on_flat[index],
-            false => 1.0 - self.on_flat[index],
+            true => [s, 1.0 - s],
+            false => [1.0 - s, s],
         }
     }
 
@@ -145,13 +153,13 @@ impl<'a> Crossings<'a> {
         Ok(Met { index, leaves })
     }
 
-    /// Fraction of a crossing along a base halfedge.
+    /// Fractions of a base halfedge before a crossing and behind it.
     #[inline]
-    pub fn base_fraction(&self, index: usize, base_halfedge: HalfedgeId) -> f64 {
-        let e = self.base.edge(base_halfedge);
-        match self.base.edge_halfedge(e) == base_halfedge {
-            true => self.on_base[index],
-            false => 1.0 - self.on_base[index],
+    pub fn base_fractions(&self, index: usize, base_halfedge: HalfedgeId) -> Fractions {
+        let s = self.on_base[index];
+        match self.base.edge_halfedge(self.base.edge(base_halfedge)) == base_halfedge {
+            true => [s, 1.0 - s],
+            false => [1.0 - s, s],
         }
     }
 

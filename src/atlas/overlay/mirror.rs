@@ -235,11 +235,11 @@ impl Half {
             return front.map(|_| ()).ok_or_else(error);
         }
         let mut corners = [VertexId::new(0); 6];
-        let mut at: [OnSide; 6] = [(0, 0.0); 6];
+        let mut at: [OnSide; 6] = [(0, [0.0, 1.0]); 6];
         for (i, &p) in polygon.iter().enumerate() {
             let (v, s) = match crossing(p) {
-                Some(index) => (vertex[index] as usize, x.fraction(index, halfedge(p))),
-                None => (x.flat.tail(halfedge(p)).index(), 0.0),
+                Some(index) => (vertex[index] as usize, x.fractions(index, halfedge(p))),
+                None => (x.flat.tail(halfedge(p)).index(), [0.0, 1.0]),
             };
             if v == NONE as usize || (p.place == 0 && v >= vertices) {
                 return Err(error());

@@ -138,13 +138,20 @@ pub fn overlay(
     refine(mesh, metric, prescription, *intrinsic, &curves, &places)
 }
 
-/// Most crossings, for each edge and besides: ordinary meshes have one or two an edge, and every crossing costs a kilobyte.
-const MOST_CROSSINGS: (u128, u128) = (16, 1_000_000);
+/// Most crossings of an edge, on the mean: ordinary meshes have one or two, and every crossing costs more than a kilobyte.
+const MOST_CROSSINGS_OF_EDGE: u128 = 8;
+/// So many are allowed whatever the number of edges: less than a gigabyte, which is what a file below a megabyte may cost.
+const ALLOWED_CROSSINGS: u128 = 700_000;
 
 /// Refuses what would have many times the faces of the mesh, before anything is made of it: fans of n needles can cross n² times.
 fn check_crossings(intrinsic: &Intrinsic) -> Result<(), OverlayError> {
     let edges = intrinsic.base.edge_count();
-    let most = MOST_CROSSINGS.0 * edges as u128 + MOST_CROSSINGS.1;
+    // Of a doubled surface half of them lie behind the mirror.
+    let sides = match intrinsic.front_faces < intrinsic.base.face_count() {
+        true => 2,
+        false => 1,
+    };
+    let most = (MOST_CROSSINGS_OF_EDGE * edges as u128).max(sides * ALLOWED_CROSSINGS);
     for integers in [
         &intrinsic.base_on_delaunay,
         &intrinsic.delaunay_on_flat,
@@ -229,7 +236,7 @@ fn refine(
         let mut values = Vec::with_capacity(3 * base_face.len() * attribute.components);
         for (h, corner) in corners.iter().enumerate() {
             let (face, side) = (base_face[h / 3] as usize, usize::from(corner.side));
-            attribute.interpolate(face, side, corner.fraction, &mut values);
+            attribute.interpolate(face, side, corner.fractions[0], &mut values);
         }
         attribute.with_values(values)
     });

@@ -7,7 +7,7 @@
 
 use super::OverlayError;
 use super::crossings::Crossings;
-use super::flat_face::{FlatFace, OnSide};
+use super::flat_face::{FlatFace, Fractions, OnSide};
 use super::layout::Carrier;
 use super::mirror::{Half, Under};
 use super::polygon::{Faces, Laid, MOST, distances};
@@ -20,8 +20,8 @@ use crate::geometry::mesh::distance;
 pub struct OnBase {
     /// Side, from the base corner where it begins.
     pub side: u8,
-    /// Fraction along it; 0 at the corner.
-    pub fraction: f64,
+    /// Fractions of it before the corner of the overlay and behind it; 0 and 1 at the corner where it begins.
+    pub fractions: Fractions,
 }
 
 /// What lies under final edges.
@@ -86,9 +86,9 @@ struct Corner {
     /// The crossing; `None` at a base vertex.
     crossing: Option<usize>,
     on_base: OnBase,
-    /// On the border of the final face: halfedge and fraction.
+    /// On the border of the final face: halfedge and fractions.
     border: HalfedgeId,
-    fraction: f64,
+    fractions: Fractions,
     carrier: Carrier,
 }
 
@@ -151,7 +151,7 @@ impl Regions {
             let under = inputs.ground.under(x, border[k], 0).ok_or_else(error)?;
             self.on_base.push(OnBase {
                 side: k as u8,
-                fraction: 0.0,
+                fractions: [0.0, 1.0],
             });
             self.carrier.push(Carrier {
                 halfedge: under.halfedge,
@@ -187,10 +187,10 @@ impl Regions {
             crossing: None,
             on_base: OnBase {
                 side: 0,
-                fraction: 0.0,
+                fractions: [0.0, 1.0],
             },
             border: HalfedgeId::new(0),
-            fraction: 0.0,
+            fractions: [0.0, 1.0],
             carrier: Carrier {
                 halfedge: HalfedgeId::new(0),
                 fraction: 0.0,
@@ -220,9 +220,9 @@ impl Regions {
             }
             corners[i].vertex = VertexId::new(vertex as usize);
             corners[i].crossing = Some(met.index);
-            corners[i].on_base.fraction = x.base_fraction(met.index, halfedge(p));
+            corners[i].on_base.fractions = x.base_fractions(met.index, halfedge(p));
             corners[i].border = border;
-            corners[i].fraction = x.fraction(met.index, border);
+            corners[i].fractions = x.fractions(met.index, border);
         }
         // Base vertices follow from the next corner.
         for i in 0..n {
@@ -268,7 +268,7 @@ impl Regions {
     fn lay(&mut self, inputs: &Inputs, f: FaceId, corners: &[Corner], final_face: FaceId) -> Laid {
         let (x, n) = (inputs.x, corners.len());
         let face = FlatFace::new(x.flat, inputs.length, final_face);
-        let at = |i: usize| -> OnSide { (x.flat.corner(corners[i].border), corners[i].fraction) };
+        let at = |i: usize| -> OnSide { (x.flat.corner(corners[i].border), corners[i].fractions) };
         let flat = distances(n, |i, j| face.distance(at(i), at(j)));
         let position = |i: usize| inputs.position[corners[i].vertex.index()];
         let space = (n > 3).then(|| distances(n, |i, j| distance(position(i), position(j))));
@@ -381,7 +381,7 @@ fn carriers(
         corner.carrier = match (under[i].or(incoming), inputs.ground) {
             (Some(under), _) => Carrier {
                 halfedge: under.halfedge,
-                fraction: (corner.fraction - under.low) / (under.high - under.low),
+                fraction: (corner.fractions[0] - under.low) / (under.high - under.low),
             },
             (None, Ground::Whole) => Carrier {
                 halfedge: corner.border,

@@ -13,8 +13,8 @@ use super::demand::{self, Sums};
 use super::params::PatchParams;
 use super::rectangle::Oriented;
 use super::resolution::{
-    Raster, coarsest_of, covered, demands, densest, enough_long_side, least_covered, shapes,
-    stretched,
+    MOST_TO_COVER, Raster, coarsest_of, covered, demands, densest, enough_long_side, least_covered,
+    shapes, stretched,
 };
 use crate::atlas::patch::MAX_SIDE;
 use crate::atlas::plane::rotate;
@@ -79,7 +79,7 @@ fn finest(first: f64, patch: &Oriented, params: &PatchParams) -> f64 {
     (patch.to_chart.scale / most / first).log2().ceil()
 }
 
-/// The raster with texels of this width or, where these miss the patch, of half or a quarter of it.
+/// The raster with texels of this width or, where these miss the patch, of half or a quarter of it, as long as its image does not get large for that.
 fn whole(patch: &Oriented, mut width: f64, params: &PatchParams) -> Raster {
     let least = least_covered(params);
     loop {
@@ -87,10 +87,13 @@ fn whole(patch: &Oriented, mut width: f64, params: &PatchParams) -> Raster {
         if covered(patch, &raster, least) >= least {
             return raster;
         }
-        width *= 0.5;
-        if 2 * raster.width.max(raster.height) > MAX_SIDE {
-            return stretched(patch.height, densest(params), params.padding as f64);
+        let is_finest = 2 * raster.width.max(raster.height) > MAX_SIDE
+            || raster.width * raster.height >= MOST_TO_COVER;
+        if is_finest {
+            let columns = raster.density[0].clamp(1.0, densest(params));
+            return stretched(patch.height, columns, params.padding as f64);
         }
+        width *= 0.5;
     }
 }
 

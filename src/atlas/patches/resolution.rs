@@ -23,7 +23,7 @@ const MOST_IN_FLOORS: f64 = (1 << 20) as f64;
 /// See [`MOST_IN_FLOORS`].
 const MOST_BUDGETS: f64 = 4.0;
 /// An image gets no larger than this only to have texel centres inside a patch that is a thin arc.
-const MOST_TO_COVER: usize = 1 << 16;
+pub(super) const MOST_TO_COVER: usize = 1 << 16;
 /// Part of the texels in a square of the least shorter side whose centres a patch covers.
 const MIN_COVERED: f64 = 0.375;
 

@@ -21,6 +21,8 @@ use crate::atlas::texels::{Bend, FINER};
 use crate::geometry::ids::{EdgeVec, FaceVec, PatchId};
 use crate::geometry::mesh::{Mesh, cross, norm, sub};
 use rayon::prelude::*;
+use std::sync::atomic::AtomicUsize;
+use std::sync::atomic::Ordering::Relaxed;
 
 /// So many times finer than the images is what their error is measured on.
 const MEASURED: usize = 3;
@@ -193,13 +195,29 @@ pub(super) fn placed(
     quads: &[Quad],
     curvature_tolerance: f64,
 ) -> Result<(Vec<Rectangle>, Added), RectangleError> {
-    // The error of the first one that has one, whichever is done first.
-    let flattened: Vec<Result<Rectangle, RectangleError>> = quads
+    // The error of the first one that has one, whichever is done first; those behind it need not be flattened.
+    let first_failed = AtomicUsize::new(usize::MAX);
+    let flattened: Vec<Option<Result<Rectangle, RectangleError>>> = quads
         .par_iter()
         .enumerate()
-        .map(|(i, quad)| flow::flatten(drawing, quad, i, curvature_tolerance))
+        .map(|(i, quad)| {
+            if i > first_failed.load(Relaxed) {
+                return None;
+            }
+            let flattened = flow::flatten(drawing, quad, i, curvature_tolerance);
+            if flattened.is_err() {
+                first_failed.fetch_min(i, Relaxed);
+            }
+            Some(flattened)
+        })
         .collect();
-    let mut rectangles: Vec<Rectangle> = flattened.into_iter().collect::<Result<_, _>>()?;
+    let mut rectangles = Vec::with_capacity(quads.len());
+    for flattened in flattened {
+        let left_out = || RectangleError::Inconsistent {
+            what: "the quads of a surface",
+        };
+        rectangles.push(flattened.ok_or_else(left_out)??);
+    }
     let added = Added::new(drawing, &mut rectangles)?;
     for rectangle in &mut rectangles {
         rectangle.density = density::density(rectangle, drawing, bend);

@@ -155,6 +155,7 @@ pub(super) fn regions(drawing: &Drawing) -> Vec<FaceId> {
 
 /// The region of a face as a disk.
 pub(super) fn part(drawing: &Drawing, start: FaceId) -> Result<Disk, RectangleError> {
+    drawing.check_pieces()?;
     let faces = region(&drawing.fine, &drawing.is_wall, start);
     let patch = drawing.face_patch[drawing.fine.parent[start]].index();
     Disk::new(&drawing.fine, &drawing.is_wall, faces, patch)

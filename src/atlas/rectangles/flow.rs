@@ -18,6 +18,9 @@ use crate::geometry::mesh::Mesh;
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
+/// Newton's method takes fifteen steps or so to flatten a quad; one that takes so many is too crowded for float64, and then so are most of the
+/// others, of which each is as much work as the flow of the whole surface.
+const MOST_STEPS: usize = 60;
 /// Largest difference of opposite sides, in widths of the rectangle.
 pub(super) const UNEQUAL: f64 = 1e-8;
 
@@ -77,6 +80,7 @@ pub(super) fn flatten(
     let prescription = Prescription::new(target, BoundaryCondition::Corners);
     let params = FlowParams {
         curvature_tolerance: tolerance,
+        max_newton_steps: MOST_STEPS,
         ..FlowParams::default()
     };
     let metric =
@@ -103,16 +107,16 @@ pub(super) fn flatten(
     } = overlay::overlay(mesh, metric, prescription)?;
     let fine = &mesh.connectivity;
     // Base faces, and where on them the corners lie.
-    let base = |h: HalfedgeId| -> (HalfedgeId, f64) {
+    let base = |h: HalfedgeId| -> (HalfedgeId, [f64; 2]) {
         let f = mesh.source_face[fine.face(h)] as usize;
-        let OnBase { side, fraction } = match &on_base {
+        let OnBase { side, fractions } = match &on_base {
             Some(on_base) => on_base[h],
             None => OnBase {
                 side: fine.corner(h) as u8,
-                fraction: 0.0,
+                fractions: [0.0, 1.0],
             },
         };
-        (HalfedgeId::new(3 * f + usize::from(side)), fraction)
+        (HalfedgeId::new(3 * f + usize::from(side)), fractions)
     };
     let loops = fine.boundary_loops();
     let [border] = &loops[..] else {
@@ -121,7 +125,7 @@ pub(super) fn flatten(
         });
     };
     let piece = |&h: &HalfedgeId| {
-        let (along, from) = base(h);
+        let (along, [from, _]) = base(h);
         Piece {
             wall: disk.halfedge(drawing, along),
             edge: fine.edge(h),
@@ -144,11 +148,11 @@ pub(super) fn flatten(
         });
     }
     let corner = |h: HalfedgeId| {
-        let (along, t) = base(h);
+        let (along, [before, behind]) = base(h);
         let k = along.index() % 3;
         let mut weights = [0.0; 3];
-        weights[k] = 1.0 - t;
-        weights[(k + 1) % 3] += t;
+        weights[k] = behind;
+        weights[(k + 1) % 3] = before;
         Corner {
             weights,
             uv: [0.0; 2],

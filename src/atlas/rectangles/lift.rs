@@ -92,7 +92,7 @@ fn lift_mesh(mesh: Mesh, fine: &Subdivision) -> Mesh {
     }
 }
 
-/// A face laid in the plane by its flat lengths: where corners 1 and 2 lie, seen from corner 0.
+/// A face laid in the plane by its flat lengths, from corner 0 on: where corners 1 and 2 lie, seen from there.
 fn frame(length: [f64; 3]) -> [[f64; 2]; 2] {
     let [opposite, l2, l1] = length;
     // Corner 1 lies on the first axis. From sorted differences, so that slivers keep their height.
@@ -111,7 +111,12 @@ fn flat_lengths(mesh: &Mesh, length: &EdgeVec<f64>, fine: &Subdivision) -> EdgeV
         match fine.side_of_parent(h) {
             Some(k) => {
                 let whole = length[base.edge(base.corner_halfedge(parent, k))];
-                let towards = d[(k + 1) % 3].abs().min(1.0);
+                // Weights of a corner that is far off have all their digits, those of a near one are what is left of 1.
+                let far = match p[k].min(q[k]) > 0.5 {
+                    true => (k + 1) % 3,
+                    false => k,
+                };
+                let towards = d[far].abs().min(1.0);
                 if towards == 1.0 {
                     whole
                 } else {
@@ -119,8 +124,19 @@ fn flat_lengths(mesh: &Mesh, length: &EdgeVec<f64>, fine: &Subdivision) -> EdgeV
                 }
             }
             None => {
-                let [b, c] = frame(base.face_edges(parent).map(|e| length[e]));
-                (d[1] * b[0] + d[2] * c[0]).hypot(d[1] * b[1] + d[2] * c[1])
+                // Seen from the nearest corner, for the same reason.
+                let near = [1, 2].into_iter().fold(0, |near, k| {
+                    if p[k] + q[k] > p[near] + q[near] {
+                        k
+                    } else {
+                        near
+                    }
+                });
+                let of = |k: usize| (near + k) % 3;
+                let edges = base.face_edges(parent);
+                let [b, c] = frame([0, 1, 2].map(|k| length[edges[of(k)]]));
+                let (s, t) = (d[of(1)], d[of(2)]);
+                (s * b[0] + t * c[0]).hypot(s * b[1] + t * c[1])
             }
         }
     };

@@ -75,6 +75,11 @@ const LEAST_TEXELS: usize = 136;
 /// Faces that a cluster is to have at least, on the mean.
 const LEAST_FACES: usize = 12;
 
+/// Most pieces of a face that the flat triangulation leaves, on the mean: ordinary meshes have two or three.
+const MOST_PIECES: usize = 16;
+/// So many more are allowed, whatever the number of faces.
+const ALLOWED_PIECES: usize = 60_000;
+
 /// A surface with its flat metric, slit, developed and covered by charts.
 #[derive(Clone, Debug)]
 pub struct Charted {
@@ -149,6 +154,18 @@ pub enum RectangleError {
         /// Faces of the rectangle.
         faces: usize,
     },
+    /// The flat triangulation, or lines between rectangles, cross faces far more often than their number makes believe.
+    #[error(
+        "the {faces} faces of this surface would be cut into {pieces} pieces or more (most: {most}), since very many long thin faces lie side by side; use images.domain = \"flat\", or divide the long faces, or remesh the surface with faces of similar sides"
+    )]
+    TooManyPieces {
+        /// Pieces so far.
+        pieces: usize,
+        /// Faces that are cut.
+        faces: usize,
+        /// How many pieces there may be.
+        most: usize,
+    },
     /// A system of equations could not be solved.
     #[error(transparent)]
     Solve(#[from] SolveError),
@@ -172,6 +189,7 @@ pub fn rectangles(
     params: &PatchParams,
     curvature_tolerance: f64,
 ) -> Result<(Charted, PatchLayout), RectangleError> {
+    check_pieces(&surface.mesh)?;
     // Which division is best, only the images tell. Where clusters make rectangles too crowded for float64, flat patches may be better, since the cut ends at the tips of what stands out.
     let most = (params.texel_budget / LEAST_TEXELS)
         .min(surface.mesh.connectivity.face_count() / LEAST_FACES)
@@ -215,6 +233,23 @@ pub fn rectangles(
         "patches became rectangles"
     );
     Ok((found.surface, found.layout))
+}
+
+/// Refuses a surface whose faces the flat triangulation has cut into very many pieces: each of them is flattened again, several times.
+fn check_pieces(mesh: &Mesh) -> Result<(), RectangleError> {
+    let mut given: Vec<u32> = mesh.source_face.iter().copied().collect();
+    given.sort_unstable();
+    given.dedup();
+    let (pieces, faces) = (mesh.connectivity.face_count(), given.len());
+    let most = MOST_PIECES * faces + ALLOWED_PIECES;
+    match pieces <= most {
+        true => Ok(()),
+        false => Err(RectangleError::TooManyPieces {
+            pieces,
+            faces,
+            most,
+        }),
+    }
 }
 
 /// The one with less error; the first one, by its number, of those that are equal.

@@ -23,6 +23,11 @@ const SNAP: f64 = 0.1;
 /// A side whose faces meet at this angle on the mean is a crease, radians.
 const CREASE: f64 = 0.5;
 
+/// Most pieces of a face, on the mean: lines cross about as many faces of an ordinary mesh as lie on a way across it.
+const MOST_PIECES: usize = 5;
+/// So many more are allowed, whatever the number of faces: lines on a few faces cross all of them.
+const ALLOWED_PIECES: usize = 30_000;
+
 /// What a vertex is to the quads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
@@ -103,6 +108,20 @@ impl Drawing {
         for mut side in self.chains() {
             let half = 0.5 * self.length(&side);
             self.mark(&mut side, half, Role::Middle);
+        }
+    }
+
+    /// Whether lines have cut the faces of the surface into very many pieces.
+    pub fn check_pieces(&self) -> Result<(), RectangleError> {
+        let (pieces, faces) = (self.fine.connectivity.face_count(), self.face_patch.len());
+        let most = MOST_PIECES * faces + ALLOWED_PIECES;
+        match pieces <= most {
+            true => Ok(()),
+            false => Err(RectangleError::TooManyPieces {
+                pieces,
+                faces,
+                most,
+            }),
         }
     }
 

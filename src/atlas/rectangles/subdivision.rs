@@ -20,17 +20,17 @@ pub(super) struct Corner {
 }
 
 impl Corner {
-    fn between(p: Corner, q: Corner, t: f64) -> Corner {
+    fn between(p: Corner, q: Corner, parts: [f64; 2]) -> Corner {
         Corner {
-            weights: std::array::from_fn(|i| mix(p.weights[i], q.weights[i], t)),
-            uv: std::array::from_fn(|i| mix(p.uv[i], q.uv[i], t)),
+            weights: std::array::from_fn(|i| mix(p.weights[i], q.weights[i], parts)),
+            uv: std::array::from_fn(|i| mix(p.uv[i], q.uv[i], parts)),
         }
     }
 }
 
-/// (1 − t) p + t q; `p` itself where both are the same.
-fn mix(p: f64, q: f64, t: f64) -> f64 {
-    if p == q { p } else { (1.0 - t) * p + t * q }
+/// a p + b q with a + b = 1; `p` itself where both are the same. Both parts are given, since what is left of 1 beside a small one has lost its digits.
+fn mix(p: f64, q: f64, [a, b]: [f64; 2]) -> f64 {
+    if p == q { p } else { a * p + b * q }
 }
 
 /// See the module docs.
@@ -70,9 +70,10 @@ impl Subdivision {
         let [a, b] = self.connectivity.edge_vertices(e);
         let (p, q) = (self.position[a], self.position[b]);
         let split = self.connectivity.split_edge(e);
+        let parts = [1.0 - t, t];
         self.position
-            .push(std::array::from_fn(|i| mix(p[i], q[i], t)));
-        for (side, fraction) in split.sides.iter().zip([t, 1.0 - t]) {
+            .push(std::array::from_fn(|i| mix(p[i], q[i], parts)));
+        for (side, parts) in split.sides.iter().zip([parts, [t, 1.0 - t]]) {
             let at = |face: FaceId, k: usize| HalfedgeId::new(3 * face.index() + k % 3);
             let (old, k) = (side.old, side.corner);
             for corner in 0..3 {
@@ -80,11 +81,8 @@ impl Subdivision {
                 self.corner.push(same);
             }
             self.parent.push(self.parent[old]);
-            let middle = Corner::between(
-                self.corner[at(old, k)],
-                self.corner[at(old, k + 1)],
-                fraction,
-            );
+            let middle =
+                Corner::between(self.corner[at(old, k)], self.corner[at(old, k + 1)], parts);
             self.corner[at(old, k + 1)] = middle;
             self.corner[at(side.new, k)] = middle;
         }

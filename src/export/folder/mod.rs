@@ -224,7 +224,9 @@ impl Staging {
             return Ok(false);
         }
         let path = self.inside(subfolder)?;
-        fs::remove_dir_all(&path).map_err(ExportError::io(Action::Write, &path))?;
+        if path.exists() {
+            fs::remove_dir_all(&path).map_err(ExportError::io(Action::Write, &path))?;
+        }
         self.keep_previous(subfolder)
     }
 
