@@ -11,7 +11,7 @@
 
 use super::star::Star;
 use super::tableau::{Hessian, Limits, Tableau};
-use crate::flow::solve::{inner_products, half_products};
+use crate::flow::solve::{half_products, inner_products};
 
 /// Newton steps at most.
 const STEPS: usize = 40;
