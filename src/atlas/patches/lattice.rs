@@ -90,7 +90,8 @@ fn whole(patch: &Oriented, mut width: f64, params: &PatchParams) -> Raster {
         let is_finest = 2 * raster.width.max(raster.height) > MAX_SIDE
             || raster.width * raster.height >= MOST_TO_COVER;
         if is_finest {
-            let columns = raster.density[0].clamp(1.0, densest(params));
+            // Whole texels, or rounding would take them from the margin.
+            let columns = raster.density[0].ceil().clamp(1.0, densest(params));
             return stretched(patch.height, columns, params.padding as f64);
         }
         width *= 0.5;
