@@ -142,7 +142,7 @@ fn triangulations_that_cross_too_often_are_refused() {
     assert_eq!(failure.kind, FailureKind::Input, "{}", failure.message);
     for words in [
         "21000 edges",
-        "times (most: 1336000)",
+        "times (most: 700000)",
         "divide the long faces",
     ] {
         assert!(failure.message.contains(words), "{}", failure.message);
