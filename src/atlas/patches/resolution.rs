@@ -175,9 +175,10 @@ impl Raster {
     }
 }
 
-/// Most texels on the longer side of a patch.
+/// Most texels on the longer side of a patch: its image must have room in the packed square, too.
 pub(super) fn densest(params: &PatchParams) -> f64 {
-    (MAX_SIDE - 2 * params.padding.max(1)) as f64
+    let side = params.packed_side.unwrap_or(MAX_SIDE).min(MAX_SIDE);
+    side.saturating_sub(2 * params.padding.max(1)).max(1) as f64
 }
 
 /// Least texels on the shorter side.
