@@ -42,8 +42,8 @@ pub struct Prescription {
     pub cones: Vec<Cone>,
     /// What happens on the boundary. `Free` on closed surfaces, where it says nothing.
     pub boundary: BoundaryCondition,
-    /// By how many quarter turns every loop of [`homology_basis`](crate::flow::holonomy::homology_basis) on the surface's own Delaunay triangulation shall
-    /// turn, for flows to quarter turns; `None` leaves that to the flow.
+    /// By how many quarter turns every loop of the surface's [`LoopedSurface`](crate::flow::looped::LoopedSurface) shall turn, for flows to quarter turns; `None` leaves
+    /// that to the flow.
     pub turning: Option<Vec<i64>>,
 }
 

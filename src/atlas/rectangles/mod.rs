@@ -235,21 +235,31 @@ pub fn rectangles(
     Ok((found.surface, found.layout))
 }
 
+impl RectangleError {
+    /// Refuses more pieces than so many for each of the faces that are cut, and so many more.
+    fn check_pieces(pieces: usize, faces: usize, [of_face, more]: [usize; 2]) -> Result<(), Self> {
+        let most = of_face * faces + more;
+        match pieces <= most {
+            true => Ok(()),
+            false => Err(Self::TooManyPieces {
+                pieces,
+                faces,
+                most,
+            }),
+        }
+    }
+}
+
 /// Refuses a surface whose faces the flat triangulation has cut into very many pieces: each of them is flattened again, several times.
 fn check_pieces(mesh: &Mesh) -> Result<(), RectangleError> {
     let mut given: Vec<u32> = mesh.source_face.iter().copied().collect();
     given.sort_unstable();
     given.dedup();
-    let (pieces, faces) = (mesh.connectivity.face_count(), given.len());
-    let most = MOST_PIECES * faces + ALLOWED_PIECES;
-    match pieces <= most {
-        true => Ok(()),
-        false => Err(RectangleError::TooManyPieces {
-            pieces,
-            faces,
-            most,
-        }),
-    }
+    RectangleError::check_pieces(
+        mesh.connectivity.face_count(),
+        given.len(),
+        [MOST_PIECES, ALLOWED_PIECES],
+    )
 }
 
 /// The one with less error; the first one, by its number, of those that are equal.

@@ -111,18 +111,13 @@ impl Drawing {
         }
     }
 
-    /// Whether lines have cut the faces of the surface into very many pieces.
+    /// Refuses a surface whose faces lines have cut into very many pieces.
     pub fn check_pieces(&self) -> Result<(), RectangleError> {
-        let (pieces, faces) = (self.fine.connectivity.face_count(), self.face_patch.len());
-        let most = MOST_PIECES * faces + ALLOWED_PIECES;
-        match pieces <= most {
-            true => Ok(()),
-            false => Err(RectangleError::TooManyPieces {
-                pieces,
-                faces,
-                most,
-            }),
-        }
+        RectangleError::check_pieces(
+            self.fine.connectivity.face_count(),
+            self.face_patch.len(),
+            [MOST_PIECES, ALLOWED_PIECES],
+        )
     }
 
     /// Splits an edge at a fraction from the tail of its halfedge; what is a wall stays one.

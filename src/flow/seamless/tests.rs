@@ -1,3 +1,4 @@
+use super::jacobian::Columns;
 use super::newton::Reuse;
 use super::norm::Norm;
 use super::state::Problem;
@@ -139,25 +140,35 @@ fn the_jacobian_agrees_with_finite_differences() {
         let state = problem.evaluate(&penner);
         assert!(state.flips.len() > 20);
         let jacobian = state.by_edges(&problem);
-        for e in (0..penner.len()).step_by(3) {
-            let h = 1e-5;
-            let mut direction = EdgeVec::filled(0.0, penner.len());
-            direction[EdgeId::new(e)] = 1.0;
-            let exact = jacobian.times(&direction, problem.equations());
-            let at = |step: f64| {
-                let mut moved = penner.clone();
-                moved[EdgeId::new(e)] += step;
-                problem.evaluate(&moved).missing
-            };
-            let (up, down) = (at(h), at(-h));
-            let scale = exact.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
-            for (i, x) in exact.iter().enumerate() {
-                let difference = (down[i] - up[i]) / (2.0 * h);
-                assert!(
-                    (x - difference).abs() < 1e-6 * scale,
-                    "{x} against {difference}"
-                );
-            }
+        let edges = (0..penner.len()).step_by(3).map(EdgeId::new);
+        assert_derivatives(&problem, &jacobian, edges, |e, step| {
+            let mut moved = penner.clone();
+            moved[e] += step;
+            moved
+        });
+    }
+}
+
+/// The columns of some edges against differences of the angles; `moved`: λ with an edge changed by so much.
+fn assert_derivatives(
+    problem: &Problem,
+    jacobian: &Columns,
+    edges: impl Iterator<Item = EdgeId>,
+    moved: impl Fn(EdgeId, f64) -> EdgeVec<f64>,
+) {
+    let h = 1e-5;
+    for e in edges {
+        let mut direction = EdgeVec::filled(0.0, problem.base.edge_count());
+        direction[e] = 1.0;
+        let exact = jacobian.times(&direction, problem.equations());
+        let [up, down] = [h, -h].map(|step| problem.evaluate(&moved(e, step)).missing);
+        let scale = exact.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+        for (i, x) in exact.iter().enumerate() {
+            let difference = (down[i] - up[i]) / (2.0 * h);
+            assert!(
+                (x - difference).abs() < 1e-6 * scale,
+                "{x} against {difference}"
+            );
         }
     }
 }

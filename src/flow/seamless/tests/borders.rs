@@ -151,27 +151,13 @@ fn the_jacobian_of_symmetric_changes_agrees_with_finite_differences() {
         let state = problem.evaluate(&penner);
         assert!(state.flips.len() > 20);
         let jacobian = state.by_edges(&problem);
-        for e in on.connectivity.edges().step_by(7) {
-            let e = problem.shares[e];
-            let h = 1e-5;
-            let mut direction = EdgeVec::filled(0.0, penner.len());
-            direction[e] = 1.0;
-            let exact = jacobian.times(&direction, problem.equations());
-            let at = |step: f64| {
-                let mut moved = penner.clone();
-                moved[e] += step;
-                problem.evaluate(&reflection.symmetric(&moved)).missing
-            };
-            let (up, down) = (at(h), at(-h));
-            let scale = exact.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
-            for (i, x) in exact.iter().enumerate() {
-                let difference = (down[i] - up[i]) / (2.0 * h);
-                assert!(
-                    (x - difference).abs() < 1e-6 * scale,
-                    "{x} against {difference}"
-                );
-            }
-        }
+        let edges = on.connectivity.edges().step_by(7);
+        let edges = edges.map(|e| problem.shares[e]);
+        assert_derivatives(&problem, &jacobian, edges, |e, step| {
+            let mut moved = penner.clone();
+            moved[e] += step;
+            reflection.symmetric(&moved)
+        });
     }
 }
 
