@@ -393,12 +393,14 @@ mod tests {
             history: Vec::new(),
             max_curvature_error: 0.0,
             fit: None,
+            opened: None,
+            lines: Vec::new(),
         };
         let prescription = Prescription {
             target,
             cones,
             boundary,
-            turning: None,
+            field: None,
         };
         let layout = Layout::identity(c, &length);
         let cut = cut(c, &length, &prescription).unwrap();
@@ -528,7 +530,7 @@ mod tests {
             target: curvature(&mesh),
             cones: Vec::new(),
             boundary: BoundaryCondition::Free,
-            turning: None,
+            field: None,
         };
         assert!(holonomy_error(&mesh, &cut, &charts, &prescription) > 0.9e-3);
         assert!(transition_residual(&charts, &cut, &central, &mesh) > 1e-4);

@@ -352,6 +352,16 @@ pub const KEYS: &[Key] = &[
     ),
     key("connectivity.enabled", Kind::Bool, "", "absent"),
     key(
+        "features.angle",
+        Kind::Number {
+            min: 1.0,
+            max: 180.0,
+        },
+        "degrees",
+        "40.0",
+    ),
+    key("features.materials", Kind::Bool, "", "false"),
+    key(
         "connectivity.rings",
         Kind::Integer { min: 0, max: 3 },
         "rings",

@@ -69,6 +69,8 @@ pub struct Config {
     pub cones: ConeParams,
     /// What happens on boundary loops (5.2).
     pub boundary: BoundaryParams,
+    /// Which edges become lines of the atlas.
+    pub features: FeatureParams,
     /// Connectivity repair around cones (5.3).
     pub connectivity: RefineParams,
     /// The Ricci flow (3.3, 3.4, 4.2).

@@ -10,6 +10,7 @@ pub use crate::atlas::geometry_image::ImageParams;
 pub use crate::atlas::patches::PatchParams;
 pub use crate::export::report::ReportParams;
 pub use crate::flow::cones::{BoundaryParams, ConeParams};
+pub use crate::flow::features::FeatureParams;
 pub use crate::flow::refine::RefineParams;
 pub use crate::flow::ricci::FlowParams;
 pub use crate::read::ReadParams;

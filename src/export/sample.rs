@@ -245,7 +245,7 @@ impl Grid {
                 target: VertexVec::filled(0.0, vertices),
                 cones: Vec::new(),
                 boundary: BoundaryCondition::Free,
-                turning: None,
+                field: None,
             },
             flow: FlowParams::default(),
             metric: FlatMetric {
@@ -256,6 +256,8 @@ impl Grid {
                 history: vec![FlowStep::default()],
                 max_curvature_error: 0.0,
                 fit: None,
+                opened: None,
+                lines: Vec::new(),
             },
             charts: self.charts(&uv, &cut),
             cut,

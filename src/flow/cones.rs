@@ -37,6 +37,7 @@ pub(crate) use super::pi_multiple::in_pi;
 pub use super::pi_multiple::{NotAMultiple, PiMultiple};
 pub use super::prescription::{BoundaryCondition, Cone, Prescription};
 
+use super::features::FeatureParams;
 use super::prescription::GAUSS_BONNET_TOLERANCE;
 use crate::geometry::connectivity::Topology;
 use crate::geometry::ids::{VertexId, VertexVec};
@@ -54,6 +55,7 @@ pub fn prescribe(
     requests: &Requests,
     cones: &ConeParams,
     boundary: &BoundaryParams,
+    features: &FeatureParams,
 ) -> Result<Prescription, ConeError> {
     let topology = mesh.connectivity.topology();
     let condition = match (topology.boundary_loops, cones.strategy) {
@@ -68,11 +70,11 @@ pub fn prescribe(
     // By what name each vertex got its curvature.
     let mut named = VertexVec::filled(None, mesh.connectivity.vertex_count());
     let on_boundary = boundary::prescribed_total(&topology, requests, condition, boundary)?;
-    let mut turning = None;
+    let mut from_field = None;
     let chosen = match (cones.strategy, requests.cones.is_empty()) {
         (ConeStrategy::Field, _) => {
-            let (chosen, turns) = field::select(mesh)?;
-            turning = Some(turns);
+            let (chosen, found) = field::select(mesh, features)?;
+            from_field = Some(Box::new(found));
             chosen
         }
         (ConeStrategy::Auto | ConeStrategy::Listed, true) => {
@@ -122,7 +124,7 @@ pub fn prescribe(
     };
     check_total(mesh, &topology, condition, rounding, &mut target)?;
     Ok(Prescription {
-        turning,
+        field: from_field,
         ..Prescription::new(target, condition)
     })
 }

@@ -56,6 +56,8 @@ pub struct Delaunay {
     pub flips: usize,
     /// How often every edge was flipped at this `u`; all zero between evaluations.
     tired: EdgeVec<u8>,
+    /// Edges that stay, Delaunay or not; `None` where none need do.
+    held: Option<EdgeVec<bool>>,
 }
 
 /// A flip by Ptolemy's theorem, and how the new length depends on the old ones:
@@ -115,6 +117,15 @@ impl Delaunay {
             correspondences,
             record: None,
             flips: 0,
+            held: None,
+        }
+    }
+
+    /// The same with edges that are never flipped.
+    pub fn holding(self, held: EdgeVec<bool>) -> Self {
+        Self {
+            held: Some(held),
+            ..self
         }
     }
 
@@ -127,17 +138,15 @@ impl Delaunay {
         self.flip_all(&u, &mut shape, Diagonal::Euclid);
     }
 
-    /// Flips an edge whatever the test says, to the length whose logarithm is given; false where it has no other diagonal.
-    pub fn flip_to(&mut self, e: EdgeId, log_length: f64) -> bool {
-        let Some(flip) = self.connectivity.flip(e) else {
-            return false;
-        };
+    /// Flips an edge whatever the test says, to the length whose logarithm is given; `None` where it has no other diagonal.
+    pub fn flip_to(&mut self, e: EdgeId, log_length: f64) -> Option<Flip> {
+        let flip = self.connectivity.flip(e)?;
         (self.high[e], self.low[e]) = (log_length, 0.0);
         for correspondence in &mut self.correspondences {
             correspondence.flipped(&self.connectivity, &flip);
         }
         self.flips += 1;
-        true
+        Some(flip)
     }
 
     /// Flips to the Delaunay triangulation at `u` (relative to [`scale`](Self::scale)) by Ptolemy's theorem, and leaves the shapes of all faces in `shape`, whose
@@ -164,13 +173,19 @@ impl Delaunay {
         &self.scale
     }
 
+    /// ln of the length of one edge with what was taken into it.
+    pub fn log_length(&self, e: EdgeId) -> f64 {
+        self.high[e] + self.low[e]
+    }
+
     /// ln of the length of every edge with what was taken into it.
     pub fn log_lengths(&self) -> EdgeVec<f64> {
         let parts = self.high.iter().zip(self.low.iter());
         parts.map(|(high, low)| high + low).collect()
     }
 
-    fn update_shapes(&self, u: &VertexVec<f64>, shape: &mut FaceVec<FaceShape>) {
+    /// The shapes of all faces at `u`, whose buffer is reused.
+    pub fn update_shapes(&self, u: &VertexVec<f64>, shape: &mut FaceVec<FaceShape>) {
         if shape.len() != self.connectivity.face_count() {
             *shape = FaceVec::filled(FaceShape::default(), self.connectivity.face_count());
         }
@@ -271,6 +286,9 @@ impl Delaunay {
         let Some(t) = c.twin(h) else {
             return false;
         };
+        if self.held.as_ref().is_some_and(|held| held[e]) {
+            return false;
+        }
         let (f, g) = (c.face(h), c.face(t));
         // A face glued to itself has both angles inside, so their sum is below π.
         if f == g {

@@ -142,6 +142,18 @@ impl CrossField {
         })
     }
 
+    /// The same field where both sides of some features are glued again.
+    #[must_use]
+    pub fn glued(&self, sides: &[[HalfedgeId; 2]]) -> Self {
+        let mut field = self.clone();
+        for &[h, t] in sides {
+            // From one side to the direction of the feature and on to the other side.
+            let turn = self.matching[h] - self.matching[t];
+            (field.matching[h], field.matching[t]) = (turn, -turn);
+        }
+        field
+    }
+
     /// The angle of a corner of the closed surface or the double.
     fn angle_at(
         &self,

@@ -1,14 +1,15 @@
 //! The closed triangulation on which cross fields and seamless metrics are found, with its loops.
 //!
 //! *Enters:* a surface with its Delaunay triangulation. *Leaves:* that triangulation, or the symmetric one of the double where the surface has a boundary, with
-//! loops whose turnings decide those of all others. *Guaranteed:* the same loops, in the same order, for the same surface: what is found for them by one
+//! loops whose turnings decide those of all others. A surface that was cut open along features may be in several pieces. *Guaranteed:* the same loops, in the same order, for the same surface: what is found for them by one
 //! part of the program serves another.
 
 use super::holonomy::{DualLoops, HolonomyError, homology_basis, mirrored_basis};
 use super::mirror::{Reflection, front};
+use super::opened::Opened;
 use super::surface_delaunay::SurfaceDelaunay;
 use crate::geometry::connectivity::{Connectivity, ConnectivityError};
-use crate::geometry::ids::EdgeVec;
+use crate::geometry::ids::{EdgeId, EdgeVec, VertexId, VertexVec};
 
 /// See the module docs.
 #[derive(Clone, Debug)]
@@ -21,6 +22,10 @@ pub struct LoopedSurface<'a> {
     pub half: Option<(Connectivity, Reflection)>,
     /// Loops on `connectivity`.
     pub loops: DualLoops,
+    /// Where the surface was cut open along features: the vertex of which every own vertex is a sector.
+    pub sector: Option<&'a VertexVec<VertexId>>,
+    /// Edges of `connectivity`, on the mirror, that are both sides of a feature.
+    pub glued: Vec<[EdgeId; 2]>,
 }
 
 /// Why there are no loops.
@@ -43,6 +48,8 @@ impl<'a> LoopedSurface<'a> {
                 length: ground.length(),
                 half: None,
                 loops: homology_basis(&ground.delaunay)?,
+                sector: None,
+                glued: Vec::new(),
             });
         };
         let double = &symmetric.connectivity;
@@ -54,6 +61,21 @@ impl<'a> LoopedSurface<'a> {
             length: symmetric.log_length.iter().map(|l| l.exp()).collect(),
             loops: mirrored_basis(&half, double, &reflection)?,
             half: Some((half, reflection)),
+            sector: None,
+            glued: Vec::new(),
+        })
+    }
+
+    /// The same of a surface that was cut open; `ground` must be that of what is left.
+    pub fn along_features(
+        opened: &'a Opened,
+        ground: &'a SurfaceDelaunay,
+    ) -> Result<Self, LoopedError> {
+        let sides = opened.glued.iter();
+        Ok(Self {
+            sector: Some(&opened.vertex),
+            glued: sides.map(|pair| pair.map(|h| ground.base.edge(h))).collect(),
+            ..Self::new(&opened.connectivity, ground)?
         })
     }
 

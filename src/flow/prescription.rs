@@ -3,7 +3,10 @@
 //! *Enters:* curvatures, and what happens on the boundary. *Leaves:* a [`Prescription`]. How one is chosen is told in
 //! [`super::cones`].
 
-use crate::geometry::ids::{VertexId, VertexVec};
+use crate::flow::features::Feature;
+use crate::flow::field::CrossField;
+use crate::flow::signature::Signature;
+use crate::geometry::ids::{HalfedgeId, VertexId, VertexVec};
 
 /// Bound on the difference between the total of K̄ and 2πχ, radians, that counts as rounding.
 pub const GAUSS_BONNET_TOLERANCE: f64 = 1e-9;
@@ -42,9 +45,21 @@ pub struct Prescription {
     pub cones: Vec<Cone>,
     /// What happens on the boundary. `Free` on closed surfaces, where it says nothing.
     pub boundary: BoundaryCondition,
-    /// By how many quarter turns every loop of the surface's [`LoopedSurface`](crate::flow::looped::LoopedSurface) shall turn, for flows to quarter turns; `None` leaves
-    /// that to the flow.
-    pub turning: Option<Vec<i64>>,
+    /// Where the cones are those of a cross field, what else it says; `None` leaves turnings to the flow.
+    pub field: Option<Box<FromField>>,
+}
+
+/// What a cross field prescribes for flows to quarter turns beside curvatures.
+#[derive(Clone, Debug)]
+pub struct FromField {
+    /// Chains of edges that shall become lines, the most important first; some may be given up.
+    pub features: Vec<Feature>,
+    /// Both sides of the edges of every feature, as halfedges of the own part of the [`LoopedSurface`](crate::flow::looped::LoopedSurface) that is cut open along all of them.
+    pub sides: Vec<Vec<[HalfedgeId; 2]>>,
+    /// The field on that part.
+    pub field: CrossField,
+    /// Its cone angles and turnings there.
+    pub signature: Signature,
 }
 
 impl Prescription {
@@ -59,7 +74,7 @@ impl Prescription {
             target,
             cones,
             boundary,
-            turning: None,
+            field: None,
         }
     }
 }

@@ -10,7 +10,9 @@
 //! edges by the size of their faces, and changes that scales could make less ([`SeamlessParams::conformality`]).
 //!
 //! A surface with boundary is doubled. Its triangulation need not be Delaunay, only its own mirror image ([`Start`]); the changes are kept symmetric, so every edge and vertex
-//! counts together with its image, and the mirror stays straight.
+//! counts together with its image, and the mirror stays straight. Features, edges that shall be straight lines, are cut open and so are borders of both sides; that both sides of each are equally
+//! long is one more equation. The Delaunay triangulation may cross the mirror; then flips that keep the metric make the sides edges again
+//! ([`straighten`](crate::flow::straighten)), and their lengths can be compared.
 
 mod error;
 mod jacobian;
@@ -28,7 +30,7 @@ use crate::flow::metric::total_area;
 use crate::flow::mirror::Reflection;
 use crate::flow::signature::Signature;
 use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::EdgeVec;
+use crate::geometry::ids::{EdgeId, EdgeVec};
 use crate::observe::Observer;
 use newton::Reuse;
 use norm::Norm;
@@ -45,6 +47,8 @@ pub struct Start<'a> {
     pub log_length: Option<&'a EdgeVec<f64>>,
     /// The reflection of a double.
     pub reflection: Option<&'a Reflection>,
+    /// Pairs of edges on the mirror that are both sides of a feature: as long as each other.
+    pub glued: &'a [[EdgeId; 2]],
 }
 
 /// What may be chosen about a seamless metric.
@@ -118,7 +122,7 @@ pub fn seamless(
     check_lengths(c, length)?;
     loops.check(c)?;
     signature.check(c, loops)?;
-    let problem = Problem::new(c, loops, signature, start.reflection);
+    let problem = Problem::new(start, loops, signature);
     let penner = match start.log_length {
         Some(log_length) => log_length.iter().map(|l| 2.0 * l).collect(),
         None => length.iter().map(|l| 2.0 * l.ln()).collect(),

@@ -4,15 +4,17 @@
 //! the surface and not to its accidental edges. *Guaranteed:* the same B for the same ids and lengths.
 //!
 //! A surface with boundary is doubled. Its own edges are flipped first, those of its mirror image with them: that leads to the symmetric triangulation T, which holds the mirror.
-//! Where a corner opposite the mirror is obtuse, the edge on the mirror is flipped too on the way from T to B, which need not be symmetric.
+//! Where a corner opposite the mirror is obtuse, the edge on the mirror is flipped too on the way from T to B, which need not be symmetric. Features are edges that T holds; along
+//! some of them the surface may be cut open, so that they lie on the mirror.
 
 use crate::flow::correspondence::Correspondence;
 use crate::flow::delaunay::{Delaunay, PtolemyFlip};
 use crate::flow::doubled::Doubled;
 use crate::flow::intrinsic::Intrinsic;
 use crate::flow::mirror::copies;
+use crate::flow::opened::Opened;
 use crate::geometry::connectivity::{Connectivity, ConnectivityError};
-use crate::geometry::ids::{EdgeVec, VertexId, VertexVec};
+use crate::geometry::ids::{EdgeId, EdgeVec, VertexId, VertexVec};
 
 /// A and B.
 #[derive(Clone, Debug)]
@@ -52,8 +54,29 @@ impl SurfaceDelaunay {
         surface: &Connectivity,
         source_length: &EdgeVec<f64>,
     ) -> Result<Self, ConnectivityError> {
-        let doubled = Doubled::new(surface)?;
-        let base_length = doubled.on_both(surface, source_length);
+        Self::of(surface, source_length, surface, &[])
+    }
+
+    /// The same of a surface that was cut open along some of its `features`, edges of `surface`. All of them are edges of T, which is the same wherever it is cut open.
+    pub fn along_features(
+        surface: &Connectivity,
+        source_length: &EdgeVec<f64>,
+        opened: &Opened,
+        features: &[EdgeId],
+    ) -> Result<Self, ConnectivityError> {
+        Self::of(surface, source_length, &opened.connectivity, features)
+    }
+
+    fn of(
+        surface: &Connectivity,
+        source_length: &EdgeVec<f64>,
+        opened: &Connectivity,
+        features: &[EdgeId],
+    ) -> Result<Self, ConnectivityError> {
+        let doubled = Doubled::new(opened)?;
+        let length = |e| source_length[surface.edge(opened.edge_halfedge(e))];
+        let length: EdgeVec<f64> = opened.edges().map(length).collect();
+        let base_length = doubled.on_both(opened, &length);
         let Doubled {
             connectivity: base,
             original,
@@ -61,8 +84,8 @@ impl SurfaceDelaunay {
         let identity = Correspondence::identity(&base);
         let mut delaunay = Delaunay::new(base.clone(), &base_length, vec![identity]);
         let mut symmetric = None;
-        if !surface.is_closed() {
-            flip_both(&mut delaunay, surface, source_length);
+        if !opened.is_closed() {
+            flip_both(&mut delaunay, surface, source_length, features);
             symmetric = Some(Box::new(Symmetric {
                 connectivity: delaunay.connectivity.clone(),
                 log_length: delaunay.log_lengths(),
@@ -134,10 +157,17 @@ impl SurfaceDelaunay {
     }
 }
 
-/// Flips `both`, the double of `surface`, to T: the surface's own edges until they are Delaunay, and their mirror images alike.
-fn flip_both(both: &mut Delaunay, surface: &Connectivity, source_length: &EdgeVec<f64>) {
+/// Flips `both`, the double of `surface` or of what is left of it, to T: the surface's own edges but the features until they are Delaunay, and their mirror images alike.
+fn flip_both(
+    both: &mut Delaunay,
+    surface: &Connectivity,
+    source_length: &EdgeVec<f64>,
+    features: &[EdgeId],
+) {
     let double = both.connectivity.clone();
-    let mut alone = Delaunay::new(surface.clone(), source_length, Vec::new());
+    let mut held = EdgeVec::filled(false, surface.edge_count());
+    features.iter().for_each(|&e| held[e] = true);
+    let mut alone = Delaunay::new(surface.clone(), source_length, Vec::new()).holding(held);
     alone.record = Some(Vec::new());
     alone.flip_in_the_surface();
     let log_length = alone.log_lengths();

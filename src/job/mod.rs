@@ -135,7 +135,7 @@ fn build_component(
     enter("cones")?;
     let frame = component.frame;
     let mesh = component.mesh?;
-    let prescription = cones::prescribe(&mesh, requests, &config.cones, &config.boundary)?;
+    let prescription = cones::prescribe(&mesh, requests, &config.cones, &config.boundary, &config.features)?;
     let (given, given_faces) = (mesh.positions.clone(), mesh.connectivity.to_faces());
     let source = SourceSurface::of(&mesh, &config.images);
     let Flattened {

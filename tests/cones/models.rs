@@ -44,7 +44,13 @@ pub fn choose(
     params: &ConeParams,
     condition: BoundaryCondition,
 ) -> Result<(Prescription, Vec<Chosen>), String> {
-    let given = cones::prescribe(mesh, &Default::default(), params, &boundary(condition));
+    let given = cones::prescribe(
+        mesh,
+        &Default::default(),
+        params,
+        &boundary(condition),
+        &Default::default(),
+    );
     let given = given.map_err(|e| e.to_string())?;
     let inside = given
         .cones
@@ -75,7 +81,14 @@ pub fn prescribe(
         ..Default::default()
     };
     let params = ConeParams::default();
-    cones::prescribe(mesh, &requests, &params, &boundary(condition)).map_err(|e| e.to_string())
+    cones::prescribe(
+        mesh,
+        &requests,
+        &params,
+        &boundary(condition),
+        &Default::default(),
+    )
+    .map_err(|e| e.to_string())
 }
 
 pub fn flow(mesh: &Mesh, prescription: &Prescription) -> Result<FlatMetric, String> {

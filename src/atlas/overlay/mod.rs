@@ -20,6 +20,7 @@ mod polygon;
 pub mod positions;
 mod regions;
 mod slice;
+mod welded;
 
 #[cfg(test)]
 mod tests;
@@ -115,6 +116,30 @@ impl OverlayError {
 /// # Errors
 /// Correspondence and triangulations that do not belong together, and more faces than ids can count.
 pub fn overlay(
+    mesh: Mesh,
+    mut metric: FlatMetric,
+    prescription: Prescription,
+) -> Result<Overlay, OverlayError> {
+    let Some(opened) = metric.opened.take() else {
+        return overlay_of(mesh, metric, prescription);
+    };
+    let of_opened = FlatMetric {
+        log_scale: welded::of_sectors(&metric.log_scale, &opened),
+        curvature: welded::of_sectors(&metric.curvature, &opened),
+        intrinsic: metric.intrinsic.take(),
+        ..metric.clone()
+    };
+    let target = welded::of_sectors(&prescription.target, &opened);
+    let found = overlay_of(
+        welded::open(mesh, &opened),
+        of_opened,
+        Prescription::new(target, prescription.boundary),
+    )?;
+    welded::weld(found, &opened, &metric, prescription)
+}
+
+/// The same of a surface that hangs together as its triangulations do.
+fn overlay_of(
     mesh: Mesh,
     mut metric: FlatMetric,
     prescription: Prescription,

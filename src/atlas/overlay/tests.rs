@@ -327,6 +327,8 @@ impl Case {
             history: Vec::new(),
             max_curvature_error: 0.0,
             fit: None,
+            opened: None,
+            lines: Vec::new(),
         };
         let target = VertexVec::filled(0.0, c.vertex_count());
         let prescription = Prescription::new(target, BoundaryCondition::Free);
@@ -623,6 +625,8 @@ fn broken_correspondences_are_refused() {
             history: Vec::new(),
             max_curvature_error: 0.0,
             fit: None,
+            opened: None,
+            lines: Vec::new(),
         };
         let target = VertexVec::filled(0.0, c.vertex_count());
         let prescription = Prescription::new(target, BoundaryCondition::Free);

@@ -116,7 +116,7 @@ fn torus(n: u32, m: u32, k: f64) -> AffineAtlas {
             target: VertexVec::filled(0.0, vertices),
             cones: vec![cone(0, -1.0), cone(m / 2 + 3 * m, 1.0)],
             boundary: BoundaryCondition::Free,
-            turning: None,
+            field: None,
         },
         flow: FlowParams::default(),
         metric: FlatMetric {
@@ -134,6 +134,8 @@ fn torus(n: u32, m: u32, k: f64) -> AffineAtlas {
                 .collect(),
             max_curvature_error: 1e-12,
             fit: None,
+            opened: None,
+            lines: Vec::new(),
         },
         cut: CutGraph {
             is_cut: segment.iter().map(|&s| s != NONE).collect(),

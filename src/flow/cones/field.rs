@@ -1,17 +1,20 @@
 //! Cones where the smoothest cross field is singular: multiples of π/2 that follow the shape.
 //!
-//! *Enters:* a mesh. *Leaves:* cones and corners of the border, and by how much loops turn in the field, so that a flow to quarter turns can have both.
-//! *Guaranteed:* cones have at least three quarter turns and corners at least one, as in a grid of quads. *Not guaranteed:* few cones: there are as many as the
-//! shape asks for.
+//! *Enters:* a mesh. *Leaves:* cones and corners of the border, and what else the field says, so that a flow to quarter turns can follow it.
+//! *Guaranteed:* cones have at least three quarter turns, corners of the border and sectors between features at least one, as in a grid of quads. *Not guaranteed:* few cones: there are as many
+//! as the shape asks for.
 
 use super::error::ConeError;
 use super::request::RequestedCone;
-use crate::flow::field::cross_field;
+use crate::flow::features::{Feature, FeatureParams, features};
+use crate::flow::field::{FieldError, cross_field};
 use crate::flow::looped::LoopedSurface;
 use crate::flow::metric::face_lengths;
+use crate::flow::opened::Opened;
+use crate::flow::prescription::FromField;
 use crate::flow::signature::FULL_TURN;
 use crate::flow::surface_delaunay::SurfaceDelaunay;
-use crate::geometry::ids::{EdgeVec, FaceVec};
+use crate::geometry::ids::{EdgeId, EdgeVec, FaceVec, HalfedgeId, VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
 use crate::geometry::triangle;
 use std::f64::consts::FRAC_PI_2;
@@ -19,12 +22,39 @@ use std::f64::consts::FRAC_PI_2;
 /// Least angle of a cone, quarter turns: around a vertex of two quads these would share two edges.
 const LEAST_QUARTERS: i64 = 3;
 
-/// Cones, inside and on the border, and the turning of every loop of [`LoopedSurface`], in quarter turns.
-pub(super) fn select(mesh: &Mesh) -> Result<(Vec<RequestedCone>, Vec<i64>), ConeError> {
+/// Cones, inside and on the border, and what else the field says.
+pub(super) fn select(
+    mesh: &Mesh,
+    params: &FeatureParams,
+) -> Result<(Vec<RequestedCone>, FromField), ConeError> {
+    let mut kept = features(mesh, params);
+    loop {
+        match along(mesh, &kept) {
+            // A piece between features that is too small for its corners: with fewer features it is larger.
+            Err(ConeError::Field(FieldError::TooFewVertices { .. })) if !kept.is_empty() => {
+                kept.pop();
+            }
+            // Faces without width that nothing but a flip across a feature takes away.
+            Err(ConeError::FieldOnFlatFaces) if !kept.is_empty() => kept.clear(),
+            result => {
+                let (cones, mut found) = result?;
+                found.features = kept;
+                return Ok((cones, found));
+            }
+        }
+    }
+}
+
+fn along(
+    mesh: &Mesh,
+    features: &[Feature],
+) -> Result<(Vec<RequestedCone>, FromField), ConeError> {
     let c = &mesh.connectivity;
     let source_length: EdgeVec<f64> = c.edges().map(|e| mesh.edge_length(e)).collect();
-    let ground = SurfaceDelaunay::new(c, &source_length)?;
-    let surface = LoopedSurface::new(c, &ground)?;
+    let edges: Vec<EdgeId> = features.iter().flat_map(|f| &f.edges).copied().collect();
+    let opened = Opened::new(c, &edges)?;
+    let ground = SurfaceDelaunay::along_features(c, &source_length, &opened, &edges)?;
+    let surface = LoopedSurface::along_features(&opened, &ground)?;
     let (own, length) = (surface.own(), surface.own_length());
     let sides = |f| face_lengths(own, &length, f);
     let angle: Option<FaceVec<[f64; 3]>> =
@@ -34,18 +64,43 @@ pub(super) fn select(mesh: &Mesh) -> Result<(Vec<RequestedCone>, Vec<i64>), Cone
     let area: FaceVec<f64> = area.collect();
     let mut field = cross_field(own, &angle, &area)?;
     let (signature, _) = field.grid_signature(&surface, &angle, LEAST_QUARTERS)?;
-    let cone = |v| {
-        let curvature = (FULL_TURN - signature.cone[v]) as f64 * FRAC_PI_2;
-        // On the border the double has twice the curvature.
-        RequestedCone {
-            vertex: v,
-            named: mesh.source_vertex[v],
-            curvature: match c.is_boundary_vertex(v) {
-                true => 0.5 * curvature,
-                false => curvature,
-            },
-        }
+    let flat = |v: VertexId| match c.is_boundary_vertex(v) {
+        true => FULL_TURN / 2,
+        false => FULL_TURN,
     };
-    let cones = c.vertices().filter(|&v| signature.cone[v] != FULL_TURN);
-    Ok((cones.map(cone).collect(), signature.turning))
+    let mut curvature: VertexVec<i64> = c.vertices().map(flat).collect();
+    for (sector, &v) in opened.vertex.enumerate() {
+        // The double has both halves of the angle.
+        let halves = match opened.connectivity.is_boundary_vertex(sector) {
+            true => 2,
+            false => 1,
+        };
+        curvature[v] -= signature.cone[sector] / halves;
+    }
+    let cone = |v| RequestedCone {
+        vertex: v,
+        named: mesh.source_vertex[v],
+        curvature: curvature[v] as f64 * FRAC_PI_2,
+    };
+    let cones = c.vertices().filter(|&v| curvature[v] != 0);
+    let cones = cones.map(cone).collect();
+    // The halves of an edge on the mirror, of which one is the surface's own.
+    let own_side = |h: HalfedgeId| {
+        let whole = surface.connectivity;
+        let side = whole.edge_halfedge(ground.base.edge(h));
+        let is_own = |h: &HalfedgeId| h.index() < own.halfedge_count();
+        Some(side).filter(is_own).or(whole.twin(side)).unwrap_or(side)
+    };
+    let sides_of = |feature: &Feature| {
+        let halfedges = feature.edges.iter().map(|&e| c.edge_halfedge(e));
+        let pairs = halfedges.filter_map(|h| Some([own_side(h), own_side(c.twin(h)?)]));
+        pairs.collect()
+    };
+    let found = FromField {
+        sides: features.iter().map(sides_of).collect(),
+        features: Vec::new(),
+        field,
+        signature,
+    };
+    Ok((cones, found))
 }

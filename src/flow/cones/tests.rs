@@ -112,7 +112,15 @@ fn all(
     let requests = assign(repaired, cones, boundary)?;
     let components = repaired.components.iter().zip(&requests);
     components
-        .map(|(c, r)| prescribe(c.mesh.as_ref().unwrap(), r, cones, boundary))
+        .map(|(c, r)| {
+            prescribe(
+                c.mesh.as_ref().unwrap(),
+                r,
+                cones,
+                boundary,
+                &Default::default(),
+            )
+        })
         .collect()
 }
 

@@ -52,6 +52,25 @@ impl Correspondence {
             coincident,
         })
     }
+
+    /// Some base halfedges alone: for each the current halfedge that it is, if it is one, and its crossings.
+    pub fn follow(
+        &self,
+        base: &Connectivity,
+        current: &Connectivity,
+        runs: &[HalfedgeId],
+    ) -> Result<Vec<(Option<HalfedgeId>, Vec<Crossing>)>, CorrespondenceError> {
+        let count = self.crossings()?;
+        let total = u32::try_from(count).map_err(|_| CorrespondenceError::TooManyCrossings { count });
+        let total = total? as usize;
+        let tracer = Tracer::new(self, base, current)?;
+        let follow = |&b: &HalfedgeId| {
+            let mut crossing = Vec::new();
+            let along = tracer.follow(b, total, &mut crossing)?;
+            Ok((along, crossing))
+        };
+        runs.iter().map(follow).collect()
+    }
 }
 
 pub(super) struct Tracer<'a> {

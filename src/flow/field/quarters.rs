@@ -29,16 +29,26 @@ struct Step {
     is_along: bool,
 }
 
-/// What cone angles are to be.
-struct Limits<'a> {
+/// What cone angles are, and what they are to be. Where features meet a vertex, each of its sectors is a vertex here.
+struct Angles<'a> {
     c: &'a Connectivity,
-    /// Inside.
+    /// The vertex of every sector.
+    vertex: VertexVec<VertexId>,
+    /// Angle of every sector, quarter turns.
+    cone: VertexVec<i64>,
+    /// Angle of every vertex.
+    total: VertexVec<i64>,
+    /// Number of sectors of every vertex.
+    sectors: VertexVec<u32>,
+    /// True for vertices on the border of the surface.
+    is_border: VertexVec<bool>,
+    /// Least angle of a vertex inside.
     least: i64,
 }
 
 impl CrossField {
-    /// The signature with at least `least` quarter turns at every vertex inside and one at every vertex of the border, and how many quarter turns were moved for
-    /// it. Of a torus whose signature no metric has, the flat one: no cones, no turning. `angle`: corner angles of the surface's own part, radians.
+    /// The signature with at least `least` quarter turns at every vertex inside and one at every vertex of the border and in every sector between features, and how many quarter turns were
+    /// moved for it. Of a torus whose signature no metric has, the flat one: no cones, no turning. `angle`: corner angles of the surface's own part, radians.
     pub fn grid_signature(
         &mut self,
         surface: &LoopedSurface,
@@ -47,20 +57,18 @@ impl CrossField {
     ) -> Result<(Signature, usize), FieldError> {
         let c = surface.own();
         let length = surface.own_length();
-        let limits = Limits { c, least };
-        let mut cone = self.cones(c, angle)?;
+        let mut angles = Angles::new(surface, self.cones(c, angle)?, least);
         let mut moved = 0;
         for v in c.vertices() {
-            while cone[v] < limits.least(v) {
-                let way =
-                    limits
-                        .way_from_donor(&length, &cone, v)
-                        .ok_or(FieldError::TooFewVertices {
-                            vertices: c.vertex_count(),
-                            least,
-                        })?;
+            while angles.lacks(v) {
+                let way = angles.way_from_donor(&length, v);
+                let way = way.ok_or(FieldError::TooFewVertices {
+                    vertices: c.vertex_count(),
+                    least,
+                })?;
                 for step in way {
-                    self.turn(c, step, &mut cone);
+                    self.turn(c, step);
+                    angles.turn(step);
                 }
                 moved += 1;
             }
@@ -75,44 +83,89 @@ impl CrossField {
     }
 
     /// Takes a quarter turn from where a step begins and gives it to where it ends.
-    fn turn(&mut self, c: &Connectivity, step: Step, cone: &mut VertexVec<i64>) {
+    fn turn(&mut self, c: &Connectivity, step: Step) {
         let h = step.halfedge;
-        let (turn, by) = match step.is_along {
-            true => (FRAC_PI_2, 1),
-            false => (-FRAC_PI_2, -1),
-        };
+        let turn = if step.is_along { FRAC_PI_2 } else { -FRAC_PI_2 };
         self.matching[h] -= turn;
         if let Some(t) = c.twin(h) {
             self.matching[t] += turn;
         }
-        cone[c.tail(h)] -= by;
-        cone[c.head(h)] += by;
     }
 }
 
-impl Limits<'_> {
-    fn least(&self, v: VertexId) -> i64 {
-        match self.c.is_boundary_vertex(v) {
-            true => LEAST_AT_BORDER,
-            false => self.least,
+impl<'a> Angles<'a> {
+    fn new(surface: &'a LoopedSurface<'_>, cone: VertexVec<i64>, least: i64) -> Self {
+        let c = surface.own();
+        let vertex: VertexVec<VertexId> = match surface.sector {
+            Some(vertex) => vertex.clone(),
+            None => c.vertices().collect(),
+        };
+        let mut total = VertexVec::filled(0, vertex.len());
+        let mut sectors = VertexVec::filled(0, vertex.len());
+        for (v, &of) in vertex.enumerate() {
+            total[of] += cone[v];
+            sectors[of] += 1;
         }
+        let mut is_feature = EdgeVec::filled(false, surface.connectivity.edge_count());
+        surface.glued.iter().flatten().for_each(|&e| is_feature[e] = true);
+        let mut is_border = VertexVec::filled(false, vertex.len());
+        for h in c.halfedges().filter(|&h| c.twin(h).is_none()) {
+            if !is_feature[surface.connectivity.edge(h)] {
+                is_border[vertex[c.tail(h)]] = true;
+                is_border[vertex[c.head(h)]] = true;
+            }
+        }
+        Self {
+            c,
+            vertex,
+            cone,
+            total,
+            sectors,
+            is_border,
+            least,
+        }
+    }
+
+    fn turn(&mut self, step: Step) {
+        let (tail, head) = (self.c.tail(step.halfedge), self.c.head(step.halfedge));
+        let by = if step.is_along { 1 } else { -1 };
+        for (v, by) in [(tail, -by), (head, by)] {
+            self.cone[v] += by;
+            self.total[self.vertex[v]] += by;
+        }
+    }
+
+    /// True where a side of the border or of a feature makes a corner: not at the end of a feature inside.
+    fn is_corner(&self, v: VertexId) -> bool {
+        let of = self.vertex[v];
+        self.c.is_boundary_vertex(v) && (self.sectors[of] > 1 || self.is_border[of])
+    }
+
+    /// What is missing if a sector's angle were lower by `by`.
+    fn lacks_after(&self, v: VertexId, by: i64) -> bool {
+        let of = self.vertex[v];
+        let least = if self.is_corner(v) {
+            LEAST_AT_BORDER
+        } else {
+            self.least
+        };
+        self.cone[v] - by < least || (!self.is_border[of] && self.total[of] - by < self.least)
+    }
+
+    fn lacks(&self, v: VertexId) -> bool {
+        self.lacks_after(v, 0)
     }
 
     /// The angle without a cone.
     fn flat(&self, v: VertexId) -> i64 {
-        match self.c.is_boundary_vertex(v) {
+        match self.is_corner(v) {
             true => FULL_TURN / 2,
             false => FULL_TURN,
         }
     }
 
     /// The shortest way from a vertex that has a quarter turn to spare to `to`; `None` where no vertex has.
-    fn way_from_donor(
-        &self,
-        length: &EdgeVec<f64>,
-        cone: &VertexVec<i64>,
-        to: VertexId,
-    ) -> Option<Vec<Step>> {
+    fn way_from_donor(&self, length: &EdgeVec<f64>, to: VertexId) -> Option<Vec<Step>> {
         let c = self.c;
         // Distance and the step that leads one vertex nearer, of what was reached.
         let mut reached: BTreeMap<VertexId, (f64, Option<Step>)> = BTreeMap::new();
@@ -129,8 +182,8 @@ impl Limits<'_> {
             if best.is_some_and(|(cost, _)| distance >= cost) {
                 break;
             }
-            if v != to && cone[v] > self.least(v) {
-                let factor = match cone[v] > self.flat(v) {
+            if v != to && !self.lacks_after(v, 1) {
+                let factor = match self.cone[v] > self.flat(v) {
                     true => 1.0,
                     false => CONE_PREFERENCE,
                 };

@@ -1,6 +1,6 @@
 //! Loops that generate the homology of a closed surface, or of a double as far as symmetric metrics are concerned.
 //!
-//! *Enters:* connectivity. *Leaves:* [`DualLoops`]. *Guaranteed:* 2g simple loops that generate H₁ of a closed surface; on the double of a surface of genus g with b
+//! *Enters:* connectivity. *Leaves:* [`DualLoops`]. *Guaranteed:* 2g simple loops that generate H₁ of a closed surface; on the double of a surface, of every piece of genus g with b
 //! boundary loops, 2g in the front half and b − 1 that go from one boundary to another and back on the other side. The same for the same ids. *Not guaranteed:*
 //! the shortest ones.
 //!
@@ -18,14 +18,18 @@ use crate::geometry::connectivity::Connectivity;
 use crate::geometry::disjoint_sets::UnionFind;
 use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, FaceVec, HalfedgeId};
 
-/// Shortest ways from face to face, all ending at one, the root.
+/// Shortest ways from face to face, all of a piece ending at one, its root.
 struct FaceTree {
-    /// The halfedge of a face through which its way to the root leaves; `None` at the root.
+    /// The halfedge of a face through which its way to the root leaves; `None` at a root.
     up: FaceVec<Option<HalfedgeId>>,
+    /// The root of the piece of every face that was reached.
+    root: FaceVec<Option<FaceId>>,
     /// Number of edges crossed on the way.
     depth: FaceVec<u32>,
     /// True for edges that some way crosses.
     is_crossed: EdgeVec<bool>,
+    /// Number of faces reached.
+    reached: usize,
 }
 
 /// See the module docs. The surface must be closed and connected.
@@ -35,27 +39,43 @@ pub fn homology_basis(connectivity: &Connectivity) -> Result<DualLoops, Holonomy
         let boundary_loops = c.boundary_loops().len();
         return Err(HolonomyError::NotClosed { boundary_loops });
     }
-    let tree = FaceTree::new(c, FaceId::new(0))?;
+    let mut tree = FaceTree::new(c);
+    tree.grow(c, FaceId::new(0));
+    tree.check(c)?;
     DualLoops::new(c, &tree.handles(c))
 }
 
-/// The loops of a double of which `half` is the front half: its halfedges are the first ones of `double`.
+/// The loops of a double of which `half` is the front half, in one piece or several: its halfedges are the first ones of `double`.
 pub fn mirrored_basis(
     half: &Connectivity,
     double: &Connectivity,
     reflection: &Reflection,
 ) -> Result<DualLoops, HolonomyError> {
     let boundaries = half.boundary_loops();
-    let Some((first, others)) = boundaries.split_first() else {
+    if boundaries.is_empty() {
         return homology_basis(double);
-    };
-    // Ways end at a face beside the first boundary.
-    let end = first[0];
-    let tree = FaceTree::new(half, half.face(end))?;
+    }
+    // Ways end at a face beside the first boundary of the piece.
+    let mut end = FaceVec::filled(None, half.face_count());
+    let mut tree = FaceTree::new(half);
+    let mut others = Vec::new();
+    for boundary in &boundaries {
+        let face = half.face(boundary[0]);
+        if tree.root[face].is_some() {
+            others.push(boundary);
+        } else {
+            tree.grow(half, face);
+            end[face] = Some(boundary[0]);
+        }
+    }
+    tree.check(half)?;
     let mut loops = tree.handles(half);
     for boundary in others {
         let nearest = boundary.iter().min_by_key(|&&h| tree.depth[half.face(h)]);
         let Some(&start) = nearest else { continue };
+        let Some(end) = tree.root[half.face(start)].and_then(|root| end[root]) else {
+            continue;
+        };
         let mut enter = start;
         let mut there = Vec::new();
         loop {
@@ -84,33 +104,46 @@ fn sides(c: &Connectivity, e: EdgeId) -> [HalfedgeId; 2] {
 }
 
 impl FaceTree {
-    fn new(c: &Connectivity, root: FaceId) -> Result<Self, HolonomyError> {
+    fn new(c: &Connectivity) -> Self {
         let faces = c.face_count();
-        let mut tree = Self {
+        Self {
             up: FaceVec::filled(None, faces),
+            root: FaceVec::filled(None, faces),
             depth: FaceVec::filled(0, faces),
             is_crossed: EdgeVec::filled(false, c.edge_count()),
-        };
-        let mut reached = vec![root; faces.min(1)];
+            reached: 0,
+        }
+    }
+
+    /// Ways from all faces of a piece to `root`.
+    fn grow(&mut self, c: &Connectivity, root: FaceId) {
+        let mut reached = vec![root; c.face_count().min(1)];
         let mut next = 0;
+        reached.iter().for_each(|&f| self.root[f] = Some(root));
         while let Some(&f) = reached.get(next) {
             next += 1;
             for h in c.face_halfedges(f) {
                 let Some(t) = c.twin(h) else { continue };
                 let g = c.face(t);
-                if g != root && tree.up[g].is_none() {
-                    tree.up[g] = Some(t);
-                    tree.depth[g] = tree.depth[f] + 1;
-                    tree.is_crossed[c.edge(h)] = true;
+                if self.root[g].is_none() {
+                    self.root[g] = Some(root);
+                    self.up[g] = Some(t);
+                    self.depth[g] = self.depth[f] + 1;
+                    self.is_crossed[c.edge(h)] = true;
                     reached.push(g);
                 }
             }
         }
-        match reached.len() == faces {
-            true => Ok(tree),
+        self.reached += reached.len();
+    }
+
+    /// Refuses faces that no way leads to.
+    fn check(&self, c: &Connectivity) -> Result<(), HolonomyError> {
+        match self.reached == c.face_count() {
+            true => Ok(()),
             false => Err(HolonomyError::NotConnected {
-                reached: reached.len(),
-                faces,
+                reached: self.reached,
+                faces: c.face_count(),
             }),
         }
     }

@@ -557,7 +557,8 @@ fn single_cones_of_real_models() {
             };
             let boundary = BoundaryParams::default();
             let requests = assign(&repaired, &cones, &boundary).unwrap();
-            let prescription = prescribe(mesh, &requests[0], &cones, &boundary).unwrap();
+            let prescription =
+                prescribe(mesh, &requests[0], &cones, &boundary, &Default::default()).unwrap();
             let cone = prescription.cones[0];
             let start = std::time::Instant::now();
             let (new, _, repair) = refined(mesh, &prescription);

@@ -1,9 +1,11 @@
 //! Why the flow ends without a metric: every variant names what in the input is at fault, and what to change.
 
 use crate::flow::feasibility::Violation;
+use crate::flow::field::FieldError;
 use crate::flow::looped::LoopedError;
 use crate::flow::packing::PackingError;
 use crate::flow::pi_multiple::in_pi;
+use crate::flow::straighten::StraightenError;
 use crate::flow::schemes::Scheme;
 use crate::flow::seamless::SeamlessError;
 use crate::flow::solve::SolveError;
@@ -98,6 +100,12 @@ pub enum FlowError {
     /// The loops of the surface could not be found.
     #[error(transparent)]
     Loops(#[from] LoopedError),
+    /// The lines of features could not be made edges.
+    #[error(transparent)]
+    Lines(#[from] StraightenError),
+    /// The field with fewer features has no signature.
+    #[error(transparent)]
+    Field(#[from] FieldError),
     /// The minimum was not reached, or it has broken faces.
     #[error("{}", not_converged_message(*.method, *.iterations, *.max_error, *.tolerance, *.broken, .faces))]
     NotConverged {

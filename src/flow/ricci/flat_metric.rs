@@ -1,6 +1,8 @@
 //! What the flow yields.
 
+use crate::flow::features::Feature;
 use crate::flow::intrinsic::Intrinsic;
+use crate::flow::opened::Opened;
 use crate::flow::packing::PackingFit;
 use crate::flow::step::FlowStep;
 use crate::geometry::ids::{EdgeVec, VertexVec};
@@ -21,6 +23,10 @@ pub struct FlatMetric {
     pub history: Vec<FlowStep>,
     /// max |K − K̄| over the prescribed vertices, radians.
     pub max_curvature_error: f64,
+    /// How the surface was cut open along the features that are straight lines; vertices of `intrinsic` are sectors then. `None` where there are none.
+    pub opened: Option<Box<Opened>>,
+    /// The features among those prescribed that are straight lines.
+    pub lines: Vec<Feature>,
     /// Fit of the packing, for circle packings that have one.
     pub fit: Option<PackingFit>,
 }

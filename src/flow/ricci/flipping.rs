@@ -102,6 +102,8 @@ pub(super) fn flow(
         history,
         max_curvature_error,
         fit: None,
+        opened: None,
+        lines: Vec::new(),
         intrinsic: Some(Box::new(ground.leave(
             surface.connectivity.face_count(),
             delaunay,

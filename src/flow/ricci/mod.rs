@@ -226,5 +226,7 @@ fn finish(
         history,
         max_curvature_error,
         fit: structure.fit,
+        opened: None,
+        lines: Vec::new(),
     })
 }

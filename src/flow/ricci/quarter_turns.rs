@@ -14,23 +14,33 @@ use super::flipping::{self, Surface};
 use super::params::FlowParams;
 use crate::flow::correspondence::Correspondence;
 use crate::flow::delaunay::Delaunay;
+use crate::flow::features::Feature;
 use crate::flow::looped::LoopedSurface;
+use crate::flow::metric::face_lengths;
 use crate::flow::mirror::Reflection;
-use crate::flow::prescription::{BoundaryCondition, Prescription};
+use crate::flow::opened::Opened;
+use crate::flow::prescription::{BoundaryCondition, FromField, Prescription};
 use crate::flow::scale::at_unit_scale;
 use crate::flow::schemes::FaceShape;
-use crate::flow::seamless::{SeamlessParams, SeamlessStep, Start, seamless};
+use crate::flow::seamless::{
+    SeamlessError, SeamlessMetric, SeamlessParams, SeamlessStep, Start, seamless,
+};
 use crate::flow::signature::{FULL_TURN, Signature};
 use crate::flow::step::FlowStep;
+use crate::flow::straighten::straighten;
 use crate::flow::surface_delaunay::SurfaceDelaunay;
 use crate::flow::vertex_scale::nearest_scale;
 use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{EdgeVec, FaceVec, VertexId, VertexVec};
+use crate::geometry::ids::{EdgeId, EdgeVec, FaceVec, VertexId, VertexVec};
+use crate::geometry::triangle;
 use crate::observe::Observer;
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Curvatures that are multiples of π/2 up to rounding are so to this, radians.
 const ROUNDING: f64 = 1e-9;
+
+/// Most Newton steps as long as features may be given up: those that can be met are met in fewer.
+const STEPS_WITH_FEATURES: usize = 40;
 
 /// See the module docs.
 pub(super) fn flow(
@@ -44,6 +54,20 @@ pub(super) fn flow(
         let boundary_loops = c.boundary_loops().len();
         return Err(FlowError::QuarterTurnsOnFreeBoundary { boundary_loops });
     }
+    match &prescription.field {
+        Some(field) => along_features(surface, field, params, observer),
+        None => with_cones(surface, prescription, params, observer),
+    }
+}
+
+/// Cones and corners that are given, with the nearest turnings.
+fn with_cones(
+    surface: Surface,
+    prescription: &Prescription,
+    params: &FlowParams,
+    observer: &dyn Observer,
+) -> Result<FlatMetric, FlowError> {
+    let c = surface.connectivity;
     let ground = SurfaceDelaunay::new(c, surface.source_length)?;
     let on = LoopedSurface::new(c, &ground)?;
     let own = quarters(&prescription.target)?;
@@ -51,50 +75,178 @@ pub(super) fn flow(
         true => FULL_TURN - 2 * own[v],
         false => FULL_TURN - own[v],
     };
-    let cone = ground.original.iter().map(doubled).collect();
     let log_length = ground.on_symmetric(ground.log_length.clone());
-    let turning = match &prescription.turning {
-        Some(turning) => turning.clone(),
-        None => {
-            let prescribed = VertexVec::filled(true, c.vertex_count());
-            let target = prescription.target.clone();
-            let conformal = flipping::flow(surface, target, prescribed, params, observer)?;
-            nearest_turning(&on, &log_length, &conformal)
-        }
+    let prescribed = VertexVec::filled(true, c.vertex_count());
+    let target = prescription.target.clone();
+    let conformal = flipping::flow(surface, target, prescribed, params, observer)?;
+    let signature = Signature {
+        cone: ground.original.iter().map(doubled).collect(),
+        turning: nearest_turning(&on, &log_length, &conformal),
     };
-    let found = seamless(
-        &Start {
-            connectivity: on.connectivity,
-            length: &on.length,
-            log_length: Some(&log_length),
-            reflection: on.reflection(),
-        },
-        &on.loops,
-        &Signature { cone, turning },
-        &SeamlessParams {
-            tolerance: params.curvature_tolerance,
-            conformality: params.conformality,
-            max_steps: params.max_newton_steps,
-        },
-        observer,
-    )?;
+    let max_steps = params.max_newton_steps;
+    let found = solved(&on, &log_length, &signature, params, max_steps, observer)?;
     let log_length = found.penner.iter().map(|l| 0.5 * l).collect();
     let log_length = ground.on_delaunay(log_length);
-    let history = found.history.iter().map(line).collect();
-    let metric = with_lengths(c, ground, log_length)?;
-    Ok(FlatMetric {
-        history,
+    let metric = with_lengths(c, ground, log_length, &[])?;
+    Ok(recorded(metric, &found))
+}
+
+/// Cones and turnings of a field, with as many of its features as lines as Newton's method can meet.
+fn along_features(
+    surface: Surface,
+    from: &FromField,
+    params: &FlowParams,
+    observer: &dyn Observer,
+) -> Result<FlatMetric, FlowError> {
+    let c = surface.connectivity;
+    let all = edges_of(from.features.iter());
+    let mut is_held = vec![true; from.features.len()];
+    loop {
+        let held = || {
+            let features = from.features.iter().zip(&is_held);
+            features.filter(|(_, held)| **held).map(|(f, _)| f)
+        };
+        let opened = Opened::new(c, &edges_of(held()))?;
+        let ground = SurfaceDelaunay::along_features(c, surface.source_length, &opened, &all)?;
+        let on = LoopedSurface::along_features(&opened, &ground)?;
+        let signature = match is_held.iter().all(|held| *held) {
+            true => from.signature.clone(),
+            false => without(from, &is_held, &on)?,
+        };
+        let log_length = ground.on_symmetric(ground.log_length.clone());
+        let max_steps = match held().next() {
+            Some(_) => params.max_newton_steps.min(STEPS_WITH_FEATURES),
+            None => params.max_newton_steps,
+        };
+        let found = match solved(&on, &log_length, &signature, params, max_steps, observer) {
+            Err(SeamlessError::Stalled { missing, iterations, max_error, step, .. }) if held().next().is_some() => {
+                let which = hardest(&from.features, &is_held, &opened, &missing);
+                tracing::info!("given up {which} of {}: {} edges; {iterations} steps, {max_error:.2e}, {step:.1e}", held().count(), from.features[which].edges.len());
+                is_held[which] = false;
+                continue;
+            }
+            found => found?,
+        };
+        let glued = on.glued.concat();
+        let lines: Vec<Feature> = held().cloned().collect();
+        let log_length = found.penner.iter().map(|l| 0.5 * l).collect();
+        let log_length = ground.on_delaunay(log_length);
+        let mut metric = with_lengths(&opened.connectivity, ground, log_length, &glued)?;
+        if !lines.is_empty() {
+            metric.log_scale = joined_scale(&metric.log_scale, &opened, c.vertex_count());
+            metric.curvature = joined_curvature(&metric.curvature, &opened, c);
+            metric.lines = lines;
+            metric.opened = Some(Box::new(opened));
+        }
+        return Ok(recorded(metric, &found));
+    }
+}
+
+/// The feature where most is missing; of equal ones the least important.
+fn hardest(
+    features: &[Feature],
+    is_held: &[bool],
+    opened: &Opened,
+    missing: &VertexVec<f64>,
+) -> usize {
+    let mut at = VertexVec::filled(0.0, opened.vertex.len());
+    for (sector, &v) in opened.vertex.enumerate() {
+        at[v] += missing[sector] * missing[sector];
+    }
+    let (mut worst, mut most) = (is_held.iter().rposition(|held| *held).unwrap_or(0), 0.0);
+    for (which, feature) in features.iter().enumerate().filter(|(i, _)| is_held[*i]) {
+        let sum: f64 = feature.vertices.iter().map(|&v| at[v]).sum();
+        if sum >= most && sum > 0.0 {
+            (worst, most) = (which, sum);
+        }
+    }
+    worst
+}
+
+/// The signature of a field on a surface where some features are not cut open.
+fn without(
+    from: &FromField,
+    is_held: &[bool],
+    on: &LoopedSurface,
+) -> Result<Signature, FlowError> {
+    let sides = from.sides.iter().zip(is_held);
+    let glued = sides.filter(|(_, held)| !**held).flat_map(|(s, _)| s);
+    let field = from.field.glued(&glued.copied().collect::<Vec<_>>());
+    let (own, length) = (on.own(), on.own_length());
+    let angle = own.faces().map(|f| {
+        let angles = triangle::angles(face_lengths(own, &length, f));
+        angles.unwrap_or([f64::NAN; 3])
+    });
+    Ok(field.signature(on, &angle.collect())?)
+}
+
+fn edges_of<'a>(features: impl Iterator<Item = &'a Feature>) -> Vec<EdgeId> {
+    features.flat_map(|f| &f.edges).copied().collect()
+}
+
+/// The scale of every vertex from those of its sectors: their mean.
+fn joined_scale(of_sector: &VertexVec<f64>, opened: &Opened, vertices: usize) -> VertexVec<f64> {
+    let mut sum = VertexVec::filled((0.0, 0.0), vertices);
+    for (sector, u) in of_sector.enumerate() {
+        let (total, count) = &mut sum[opened.vertex[sector]];
+        (*total, *count) = (*total + u, *count + 1.0);
+    }
+    let mean = sum.iter().map(|(total, count): &(f64, f64)| total / count);
+    mean.collect()
+}
+
+/// The curvature of every vertex from those of its sectors.
+fn joined_curvature(
+    of_sector: &VertexVec<f64>,
+    opened: &Opened,
+    surface: &Connectivity,
+) -> VertexVec<f64> {
+    let flat = |c: &Connectivity, v| if c.is_boundary_vertex(v) { PI } else { TAU };
+    let mut curvature: VertexVec<f64> = surface.vertices().map(|v| flat(surface, v)).collect();
+    for (sector, &v) in opened.vertex.enumerate() {
+        curvature[v] -= flat(&opened.connectivity, sector) - of_sector[sector];
+    }
+    curvature
+}
+
+fn solved(
+    on: &LoopedSurface,
+    log_length: &EdgeVec<f64>,
+    signature: &Signature,
+    params: &FlowParams,
+    max_steps: usize,
+    observer: &dyn Observer,
+) -> Result<SeamlessMetric, SeamlessError> {
+    let start = Start {
+        connectivity: on.connectivity,
+        length: &on.length,
+        log_length: Some(log_length),
+        reflection: on.reflection(),
+        glued: &on.glued,
+    };
+    let params = SeamlessParams {
+        tolerance: params.curvature_tolerance,
+        conformality: params.conformality,
+        max_steps,
+    };
+    seamless(&start, &on.loops, signature, &params, observer)
+}
+
+fn recorded(metric: FlatMetric, found: &SeamlessMetric) -> FlatMetric {
+    FlatMetric {
+        history: found.history.iter().map(line).collect(),
         max_curvature_error: found.max_error,
         ..metric
-    })
+    }
 }
 
 /// The metric that B has with other lengths (natural logarithms, Penner coordinates), whose Delaunay triangulation must be flat but for cones, and symmetric on a
-/// double. The record of how it was found is empty.
+/// double. `lines`: edges of A on the mirror that shall be edges of C. The record of how it was found is empty.
 pub(crate) fn with_lengths(
     surface: &Connectivity,
     ground: SurfaceDelaunay,
     log_length: EdgeVec<f64>,
+    lines: &[EdgeId],
 ) -> Result<FlatMetric, FlowError> {
     let parts = log_length.iter().zip(ground.log_length.iter());
     let change: EdgeVec<f64> = parts.map(|(to, from)| to - from).collect();
@@ -104,7 +256,12 @@ pub(crate) fn with_lengths(
         u = Reflection::new(&ground.base, surface.face_count()).mean(&u);
     }
     let delaunay_penner = at_unit_scale(&ground.delaunay, &log_length, &u);
-    let (flat, shape) = flipped(&ground, log_length);
+    let (mut flat, mut shape) = flipped(&ground, log_length);
+    if !lines.is_empty() {
+        straighten(&mut flat, &ground.base, lines)?;
+        let still = VertexVec::filled(0.0, ground.base.vertex_count());
+        flat.update_shapes(&still, &mut shape);
+    }
     let c = &flat.connectivity;
     let mut curvature = VertexVec::filled(TAU, c.vertex_count());
     for (f, shape) in shape.enumerate() {
@@ -125,6 +282,8 @@ pub(crate) fn with_lengths(
         history: Vec::new(),
         max_curvature_error: 0.0,
         fit: None,
+        opened: None,
+        lines: Vec::new(),
         intrinsic: Some(Box::new(ground.leave(
             surface.face_count(),
             flat,
@@ -215,9 +374,6 @@ mod tests {
     use super::super::{Holonomy, flow as run, shapes};
     use super::*;
     use crate::flow::holonomy::homology_basis;
-    use crate::flow::metric::face_lengths;
-    use crate::geometry::triangle;
-    use std::f64::consts::PI;
 
     fn params(holonomy: Holonomy) -> FlowParams {
         FlowParams {
@@ -266,7 +422,7 @@ mod tests {
                 l + 0.5 * (x.u[i] + x.u[j])
             };
             let log_length = ground.log_length.enumerate().map(scaled).collect();
-            let found = with_lengths(c, ground, log_length).unwrap();
+            let found = with_lengths(c, ground, log_length, &[]).unwrap();
             let y = found.intrinsic.as_ref().unwrap();
             let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} against {b}");
             x.u.iter().zip(y.u.iter()).for_each(|(a, b)| close(*a, *b));

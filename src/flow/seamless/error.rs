@@ -3,7 +3,7 @@
 use crate::flow::holonomy::HolonomyError;
 use crate::flow::signature::Infeasible;
 use crate::flow::solve::SolveError;
-use crate::geometry::ids::EdgeId;
+use crate::geometry::ids::{EdgeId, VertexVec};
 
 /// Why there is no seamless metric.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -51,6 +51,8 @@ pub enum SeamlessError {
         tolerance: f64,
         /// Part of the last Newton step that was taken; 0 where none could be.
         step: f64,
+        /// What is missing at every vertex of the triangulation given: angles, radians, and differences of λ beside features.
+        missing: VertexVec<f64>,
     },
     /// The angles are met, but in float64 some faces are no triangles.
     #[error(

@@ -6,7 +6,7 @@
 //!
 //! By the lengths of the Delaunay triangulation, with w_k = ½ cot θ_k, a face has ∂θ_k/∂λ_k = w_i + w_j and ∂θ_k/∂λ_i = −w_j (λ_k opposite corner k). Those lengths
 //! depend on λ by the rows of T: the unit row where an edge was never flipped, else d λ_dc = −d λ_ab + w (d λ_ad + d λ_bc) + (1 − w)(d λ_ca + d λ_db)
-//! one flip after another.
+//! one flip after another; after flips that keep the metric likewise, with other factors.
 
 use super::state::{Problem, State};
 use crate::flow::delaunay::PtolemyFlip;
@@ -113,7 +113,8 @@ impl State {
     pub(super) fn by_edges(&self, problem: &Problem) -> Columns {
         let c = &self.connectivity;
         let edges = c.edge_count();
-        let flipped = FlippedRows::new(&self.flips, edges);
+        let flipped = FlippedRows::new(self, edges);
+        let side = self.sides_of_features(problem);
         let (first, dependent) = flipped.by_edge(edges);
         let mut columns = Columns::with_capacity(edges, 4 * edges + edges / 2);
         let mut collector = Collector::new(problem.equations());
@@ -123,11 +124,11 @@ impl State {
             let together = [Some(e), images[e]].into_iter().flatten();
             for part in together.filter(|_| problem.shares[e] == e) {
                 if flipped.number[part] == NONE {
-                    self.add_edge(problem, part, 1.0, column, &mut collector);
+                    self.add_edge(problem, &side, part, 1.0, column, &mut collector);
                 }
                 let range = first[part.index()] as usize..first[part.index() + 1] as usize;
                 for &(of, share) in &dependent[range] {
-                    self.add_edge(problem, of, share, column, &mut collector);
+                    self.add_edge(problem, &side, of, share, column, &mut collector);
                 }
             }
             columns.close(&mut collector);
@@ -135,12 +136,17 @@ impl State {
         columns
     }
 
-    /// ∂(angles)/∂u for a scale u at every vertex: a column a vertex. Scales commute with flips, so T is not needed.
-    pub(super) fn by_scales(&self, problem: &Problem) -> Columns {
+    /// ∂(angles)/∂u for a scale u at every vertex: a column a vertex.
+    pub(super) fn by_scales(&self, problem: &Problem, by_edges: &Columns) -> Columns {
         let c = &self.connectivity;
         let vertices = c.vertex_count();
         let mut columns = Columns::with_capacity(vertices, 8 * vertices);
         let mut collector = Collector::new(problem.equations());
+        if !self.glued.is_empty() {
+            self.by_scales_of_edges(problem, by_edges, &mut columns, &mut collector);
+            return columns;
+        }
+        // Scales commute with flips by Ptolemy's theorem, so T is not needed.
         let images = images(&problem.vertex_shares);
         for v in c.vertices() {
             let together = [Some(v), images[v]].into_iter().flatten();
@@ -160,10 +166,46 @@ impl State {
         columns
     }
 
-    /// `share` times the derivatives by the length of one edge of the Delaunay triangulation.
+    /// The same by the edges of the given triangulation at every vertex: those that move with others have empty columns.
+    fn by_scales_of_edges(
+        &self,
+        problem: &Problem,
+        by_edges: &Columns,
+        columns: &mut Columns,
+        collector: &mut Collector,
+    ) {
+        let c = problem.base;
+        let images = images(&problem.vertex_shares);
+        for v in c.vertices() {
+            let together = [Some(v), images[v]].into_iter().flatten();
+            let together = together.filter(|_| problem.vertex_shares[v] == v);
+            let ends = together.flat_map(|part| c.outgoing(part));
+            for h in ends.filter(|&h| problem.shares[c.edge(h)] == c.edge(h)) {
+                let (rows, values) = by_edges.column(c.edge(h).index());
+                for (&r, &value) in rows.iter().zip(values) {
+                    collector.add(v.index(), r, value);
+                }
+            }
+            columns.close(collector);
+        }
+    }
+
+    /// The equation that an edge is a side of, and its sign there; `NONE` for others.
+    fn sides_of_features(&self, problem: &Problem) -> EdgeVec<(u32, f64)> {
+        let mut side = EdgeVec::filled((NONE, 0.0), self.connectivity.edge_count());
+        for (i, pair) in self.glued.iter().enumerate() {
+            for (&e, sign) in pair.iter().zip([1.0, -1.0]) {
+                side[e] = ((problem.cone_equations + i) as u32, sign);
+            }
+        }
+        side
+    }
+
+    /// `share` times the derivatives by the length of one edge of this triangulation.
     fn add_edge(
         &self,
         problem: &Problem,
+        side: &EdgeVec<(u32, f64)>,
         e: EdgeId,
         share: f64,
         column: usize,
@@ -171,6 +213,10 @@ impl State {
     ) {
         let c = &self.connectivity;
         let h = c.edge_halfedge(e);
+        let (row, sign) = side[e];
+        if row != NONE {
+            collector.add(column, row, sign * share);
+        }
         for h in [Some(h), c.twin(h)].into_iter().flatten() {
             let opposite = (c.corner(h) + 2) % 3;
             let weight = self.shape[c.face(h)].weight;
@@ -198,7 +244,7 @@ impl State {
             }
         }
         for turn in self.loops.turns_in(c, f) {
-            let row = (problem.cone_equations + turn.of) as u32;
+            let row = (problem.local_equations() + turn.of) as u32;
             collector.add(column, row, turn.sign * derivative(c.corner(turn.corner)));
         }
     }
@@ -216,24 +262,23 @@ fn images<I: Id>(shares: &IdVec<I, I>) -> IdVec<I, Option<I>> {
 }
 
 impl FlippedRows {
-    fn new(flips: &[PtolemyFlip], edges: usize) -> Self {
+    fn new(state: &State, edges: usize) -> Self {
         let mut rows = Self {
             number: EdgeVec::filled(NONE, edges),
             edge: Vec::new(),
             row: Vec::new(),
         };
         let mut collector = Collector::new(edges);
-        for (i, flip) in flips.iter().enumerate() {
-            let [ca, ad, db, bc] = flip.outer;
+        let by_ptolemy = |flip: &PtolemyFlip| {
             let rest = 1.0 - flip.share;
-            let parts = [
-                (flip.edge, -1.0),
-                (ad, flip.share),
-                (bc, flip.share),
-                (ca, rest),
-                (db, rest),
-            ];
-            for (e, share) in parts {
+            let by = [-1.0, rest, flip.share, rest, flip.share];
+            (flip.edge, flip.outer, by)
+        };
+        let flips = state.flips.iter().map(by_ptolemy);
+        let others = state.straightened.iter().map(|f| (f.edge, f.outer, f.by));
+        for (i, (edge, outer, by)) in flips.chain(others).enumerate() {
+            let [ca, ad, db, bc] = outer;
+            for (e, share) in [edge, ca, ad, db, bc].into_iter().zip(by) {
                 match rows.number[e] {
                     NONE => collector.add(i, e.raw(), share),
                     n => {
@@ -248,10 +293,10 @@ impl FlippedRows {
                 .drain(..)
                 .map(|r| (r, collector.sum[r as usize]));
             let row: Vec<(u32, f64)> = row.collect();
-            match rows.number[flip.edge] {
+            match rows.number[edge] {
                 NONE => {
-                    rows.number[flip.edge] = rows.row.len() as u32;
-                    rows.edge.push(flip.edge);
+                    rows.number[edge] = rows.row.len() as u32;
+                    rows.edge.push(edge);
                     rows.row.push(row);
                 }
                 n => rows.row[n as usize] = row,

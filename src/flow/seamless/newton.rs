@@ -56,24 +56,25 @@ pub(super) fn solve(
     let mut record = SeamlessStep::default();
     let mut history = vec![record.at(&state)];
     let mut last: Option<Normal> = None;
-    let stalled = |iterations: usize, max_error: f64, step: f64| SeamlessError::Stalled {
+    let stalled = |iterations: usize, state: &State, step: f64| SeamlessError::Stalled {
         iterations,
-        max_error,
+        max_error: state.max_error,
         tolerance: params.tolerance,
         step,
+        missing: problem.missing_at(state),
     };
     while state.max_error > params.tolerance {
         if observer.cancelled() {
             return Err(SeamlessError::Cancelled);
         }
         if record.iteration >= params.max_steps {
-            return Err(stalled(record.iteration, state.max_error, record.step));
+            return Err(stalled(record.iteration, &state, record.step));
         }
         let mut normal = Normal::new(problem, &state, norm, last.take())?;
         let (direction, change) = normal.direction(problem, norm, &state.missing);
         let Some((next, found, step)) = line_search(problem, &penner, &state, &direction, &change)
         else {
-            return Err(stalled(record.iteration, state.max_error, 0.0));
+            return Err(stalled(record.iteration, &state, 0.0));
         };
         let is_fast = step == 1.0 && found.max_error <= FAST_SHARE * state.max_error;
         (penner, state) = (next, found);

@@ -23,8 +23,8 @@ pub(super) struct Normal {
 
 /// A M⁻¹ Aᵀ, off-diagonal entries in the order of the pairs.
 struct Products {
-    /// Equations of cones; loops are above.
-    cones: usize,
+    /// Equations of cones and features; loops are above.
+    local: usize,
     loops: usize,
     pairs: Vec<[u32; 2]>,
     values: Vec<f64>,
@@ -43,8 +43,9 @@ impl Normal {
     ) -> Result<Self, SolveError> {
         let equations = problem.equations();
         let by_edges = state.by_edges(problem);
-        let by_scales = norm.vertex.is_some().then(|| state.by_scales(problem));
-        let mut products = Products::new(problem.cone_equations, equations);
+        let by_scales = norm.vertex.as_ref();
+        let by_scales = by_scales.map(|_| state.by_scales(problem, &by_edges));
+        let mut products = Products::new(problem.local_equations(), equations);
         products.add(&by_edges, norm.edge.as_slice());
         if let (Some(columns), Some(weight)) = (&by_scales, &norm.vertex) {
             products.add(columns, weight.as_slice());
@@ -116,10 +117,10 @@ impl Normal {
 }
 
 impl Products {
-    fn new(cones: usize, equations: usize) -> Self {
-        let loops = equations - cones;
+    fn new(local: usize, equations: usize) -> Self {
+        let loops = equations - local;
         Self {
-            cones,
+            local,
             loops,
             pairs: Vec::new(),
             values: Vec::new(),
@@ -137,8 +138,8 @@ impl Products {
                 self.diagonal[r as usize] += v * values[i];
                 for (&s, u) in rows[..i].iter().zip(values) {
                     let (r, s) = (r.max(s) as usize, r.min(s) as usize);
-                    if s >= self.cones {
-                        let at = (r - self.cones) * self.loops + (s - self.cones);
+                    if s >= self.local {
+                        let at = (r - self.local) * self.loops + (s - self.local);
                         self.among_loops[at] += v * u;
                     } else {
                         self.pairs.push([s as u32, r as u32]);
@@ -154,7 +155,7 @@ impl Products {
         for i in 0..self.loops {
             for j in 0..i {
                 self.pairs
-                    .push([(self.cones + j) as u32, (self.cones + i) as u32]);
+                    .push([(self.local + j) as u32, (self.local + i) as u32]);
                 self.values.push(self.among_loops[i * self.loops + j]);
             }
         }

@@ -1,0 +1,187 @@
+//! Sharp edges and borders between materials, as chains that shall become straight lines of the atlas.
+//!
+//! *Enters:* a mesh. *Leaves:* chains of edges between junctions, the most important first. *Guaranteed:* the chains of a spanning forest come before those that close
+//! cycles, since a cycle may ask for more than any metric has and a forest never does; the same order for the same mesh. *Not guaranteed:* that all of them can be met.
+
+use crate::geometry::disjoint_sets::UnionFind;
+use crate::geometry::ids::{EdgeId, EdgeVec, VertexId, VertexVec};
+use crate::geometry::mesh::{Mesh, cross, dot, sub};
+use std::cmp::Ordering;
+
+/// Fewest edges of a chain that counts: shorter ones are mostly noise.
+pub const LEAST_EDGES: usize = 5;
+
+/// Sine of the angle at a corner below which a face has no direction.
+const FLAT: f64 = 1e-6;
+
+/// Cosine of the angle between two edges beyond which they do not belong to one chain: both sides of a face where a crease fades.
+const HAIRPIN: f64 = 0.5;
+
+/// Which edges shall become lines; for cones of a cross field and quarter turns only.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FeatureParams {
+    /// Edges whose faces' normals differ by this or more, degrees; 180: none.
+    pub angle: f64,
+    /// Edges between faces of different materials too.
+    pub materials: bool,
+}
+
+impl Default for FeatureParams {
+    fn default() -> Self {
+        Self {
+            angle: 40.0,
+            materials: false,
+        }
+    }
+}
+
+/// A chain of edges, from junction to junction, end to end, or closed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Feature {
+    /// Its vertices in order; the first is the last again where it is closed.
+    pub vertices: Vec<VertexId>,
+    /// Its edges in order, one fewer.
+    pub edges: Vec<EdgeId>,
+    /// Length in space, source units.
+    pub length: f64,
+    /// Mean angle between the normals of both sides, weighed by length, radians.
+    pub angle: f64,
+}
+
+impl Feature {
+    /// How much it counts beside others.
+    fn importance(&self) -> f64 {
+        self.length * self.angle
+    }
+}
+
+/// The features of a mesh, the most important first; see the module docs.
+pub fn features(mesh: &Mesh, params: &FeatureParams) -> Vec<Feature> {
+    let c = &mesh.connectivity;
+    let bend: EdgeVec<f64> = c.edges().map(|e| bend(mesh, e)).collect();
+    let least = params.angle.to_radians();
+    let is_sharp = |e: EdgeId| {
+        let between = params.materials && is_between_materials(mesh, e);
+        !c.is_boundary_edge(e) && (between || (params.angle < 180.0 && bend[e] >= least))
+    };
+    let sharp: EdgeVec<bool> = c.edges().map(is_sharp).collect();
+    let mut found: Vec<Feature> = chains(mesh, &sharp)
+        .into_iter()
+        .filter(|chain| chain.len() > LEAST_EDGES)
+        .map(|chain| feature(mesh, &bend, chain))
+        .collect();
+    found.sort_by(|a, b| {
+        let order = b.importance().partial_cmp(&a.importance());
+        order.unwrap_or(Ordering::Equal)
+    });
+    let mut joined = UnionFind::new(c.vertex_count());
+    // The border belongs together as it is.
+    for e in c.edges().filter(|&e| c.is_boundary_edge(e)) {
+        let [a, b] = c.edge_vertices(e);
+        joined.join(a.index(), b.index());
+    }
+    let joins = |f: &Feature| {
+        let ends = [f.vertices.first(), f.vertices.last()];
+        matches!(ends, [Some(a), Some(b)] if joined.join(a.index(), b.index()))
+    };
+    let (mut forest, cycles): (Vec<_>, Vec<_>) = found.into_iter().partition(joins);
+    forest.extend(cycles);
+    forest
+}
+
+/// The angle between the normals of both sides, radians; 0 on the boundary and where a face has no normal.
+fn bend(mesh: &Mesh, e: EdgeId) -> f64 {
+    let c = &mesh.connectivity;
+    let h = c.edge_halfedge(e);
+    let Some(t) = c.twin(h) else { return 0.0 };
+    let normal = |h| {
+        let [p, q, r] = mesh.face_positions(c.face(h));
+        let (a, b) = (sub(q, p), sub(r, p));
+        let normal = cross(a, b);
+        let has_width = dot(normal, normal) > FLAT * FLAT * dot(a, a) * dot(b, b);
+        has_width.then_some(normal)
+    };
+    let (Some(m), Some(n)) = (normal(h), normal(t)) else {
+        return 0.0;
+    };
+    let across = cross(m, n);
+    dot(across, across).sqrt().atan2(dot(m, n))
+}
+
+fn is_between_materials(mesh: &Mesh, e: EdgeId) -> bool {
+    let c = &mesh.connectivity;
+    let h = c.edge_halfedge(e);
+    let of = |h| mesh.face_material.as_slice().get(c.face(h).index());
+    c.twin(h).is_some_and(|t| of(h) != of(t))
+}
+
+/// Maximal chains of sharp edges between vertices where other than two of them meet, or which lie on the boundary; then closed ones.
+fn chains(mesh: &Mesh, sharp: &EdgeVec<bool>) -> Vec<Vec<VertexId>> {
+    let c = &mesh.connectivity;
+    let mut degree = VertexVec::filled(0, c.vertex_count());
+    for (e, _) in sharp.enumerate().filter(|(_, s)| **s) {
+        c.edge_vertices(e).into_iter().for_each(|v| degree[v] += 1);
+    }
+    let mut is_walked = EdgeVec::filled(false, c.edge_count());
+    let neighbours = |v: VertexId| {
+        let ways = c.outgoing(v).flat_map(|h| [h, c.prev(h)]);
+        ways.map(|h| c.edge(h)).filter(|&e| sharp[e])
+    };
+    let other = |e: EdgeId, v: VertexId| {
+        let [a, b] = c.edge_vertices(e);
+        if a == v { b } else { a }
+    };
+    let is_hairpin = |v: VertexId| {
+        let ways: Vec<_> = neighbours(v).map(|e| other(e, v)).collect();
+        let [a, b] = ways[..] else { return false };
+        let [p, q] = [a, b].map(|w| sub(mesh.positions[w], mesh.positions[v]));
+        dot(p, q) > HAIRPIN * (dot(p, p) * dot(q, q)).sqrt()
+    };
+    let is_end = |v: VertexId| degree[v] != 2 || c.is_boundary_vertex(v) || is_hairpin(v);
+    let mut chains = Vec::new();
+    let mut walk = |start: VertexId, is_walked: &mut EdgeVec<bool>| {
+        while let Some(first) = neighbours(start).find(|&e| !is_walked[e]) {
+            let mut chain = vec![start];
+            let (mut v, mut e) = (start, first);
+            loop {
+                is_walked[e] = true;
+                v = other(e, v);
+                chain.push(v);
+                if v == start || is_end(v) {
+                    break;
+                }
+                match neighbours(v).find(|&e| !is_walked[e]) {
+                    Some(next) => e = next,
+                    None => break,
+                }
+            }
+            chains.push(chain);
+        }
+    };
+    for v in c.vertices().filter(|&v| degree[v] > 0 && is_end(v)) {
+        walk(v, &mut is_walked);
+    }
+    for v in c.vertices().filter(|&v| degree[v] > 0) {
+        walk(v, &mut is_walked);
+    }
+    chains
+}
+
+fn feature(mesh: &Mesh, bend: &EdgeVec<f64>, vertices: Vec<VertexId>) -> Feature {
+    let c = &mesh.connectivity;
+    let between = |pair: &[VertexId]| {
+        let ways = c.outgoing(pair[0]).flat_map(|h| [h, c.prev(h)]);
+        let mut edges = ways.map(|h| c.edge(h));
+        edges.find(|&e| c.edge_vertices(e).contains(&pair[1]))
+    };
+    let edges: Vec<EdgeId> = vertices.windows(2).filter_map(between).collect();
+    let length: f64 = edges.iter().map(|&e| mesh.edge_length(e)).sum();
+    let turned: f64 = edges.iter().map(|&e| mesh.edge_length(e) * bend[e]).sum();
+    Feature {
+        vertices,
+        edges,
+        length,
+        angle: if length > 0.0 { turned / length } else { 0.0 },
+    }
+}
