@@ -16,7 +16,7 @@ use crate::flow::ricci::FlatMetric;
 use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId, NONE};
 use crate::geometry::mesh::{Mesh, distance as distance3, triangle_area};
 use crate::geometry::triangle::{angles, area};
-use crate::product::{MeanMax, Quality, Spread, Verdict};
+use crate::product::{MeanMax, Quality, RmsMax, Spread, Verdict};
 use std::collections::HashMap;
 use std::f64::consts::FRAC_PI_2;
 
@@ -43,6 +43,10 @@ pub fn measure(
         log_scale,
         verdict: Verdict::of(&log_scale),
         angle_error,
+        conformal_error: metric.quarter_turns.as_ref().map(|met| RmsMax {
+            rms: met.conformal_error[0],
+            max: met.conformal_error[1],
+        }),
         layout_closing_error: closing_error(mesh, cut, central, metric),
         cut_length: cut_length(mesh, cut),
         transition_residual: transition_residual(charts, cut, central, mesh),
@@ -394,7 +398,7 @@ mod tests {
             max_curvature_error: 0.0,
             fit: None,
             opened: None,
-            lines: Vec::new(),
+            quarter_turns: None,
         };
         let prescription = Prescription {
             target,

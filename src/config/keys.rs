@@ -350,7 +350,6 @@ pub const KEYS: &[Key] = &[
         "source units",
         "absent",
     ),
-    key("connectivity.enabled", Kind::Bool, "", "absent"),
     key(
         "features.angle",
         Kind::Number {
@@ -361,6 +360,7 @@ pub const KEYS: &[Key] = &[
         "40.0",
     ),
     key("features.materials", Kind::Bool, "", "false"),
+    key("connectivity.enabled", Kind::Bool, "", "absent"),
     key(
         "connectivity.rings",
         Kind::Integer { min: 0, max: 3 },

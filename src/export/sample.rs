@@ -257,7 +257,7 @@ impl Grid {
                 max_curvature_error: 0.0,
                 fit: None,
                 opened: None,
-                lines: Vec::new(),
+                quarter_turns: None,
             },
             charts: self.charts(&uv, &cut),
             cut,

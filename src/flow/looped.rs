@@ -74,7 +74,9 @@ impl<'a> LoopedSurface<'a> {
         let sides = opened.glued.iter();
         Ok(Self {
             sector: Some(&opened.vertex),
-            glued: sides.map(|pair| pair.map(|h| ground.base.edge(h))).collect(),
+            glued: sides
+                .map(|pair| pair.map(|h| ground.base.edge(h)))
+                .collect(),
             ..Self::new(&opened.connectivity, ground)?
         })
     }

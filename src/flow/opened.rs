@@ -19,10 +19,7 @@ pub struct Opened {
 
 impl Opened {
     /// Cuts some edges; those on the boundary stay as they are.
-    pub fn new(
-        connectivity: &Connectivity,
-        cuts: &[EdgeId],
-    ) -> Result<Self, ConnectivityError> {
+    pub fn new(connectivity: &Connectivity, cuts: &[EdgeId]) -> Result<Self, ConnectivityError> {
         let c = connectivity;
         let mut is_cut = EdgeVec::filled(false, c.edge_count());
         let mut glued = Vec::with_capacity(cuts.len());

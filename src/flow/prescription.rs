@@ -60,6 +60,8 @@ pub struct FromField {
     pub field: CrossField,
     /// Its cone angles and turnings there.
     pub signature: Signature,
+    /// Number of quarter turns that were moved from vertex to vertex so that a grid can have the cones.
+    pub adjusted: usize,
 }
 
 impl Prescription {

@@ -101,6 +101,8 @@ pub struct SeamlessMetric {
     pub length: EdgeVec<f64>,
     /// The loops on it.
     pub loops: DualLoops,
+    /// By how much the turning of every loop misses what was prescribed, radians.
+    pub residual: Vec<f64>,
     /// Largest error of a cone angle or a turning, radians.
     pub max_error: f64,
     /// One entry a step.
@@ -147,6 +149,7 @@ pub fn seamless(
         penner,
         length: unscaled.iter().map(|l| factor * l).collect(),
         flat: state.connectivity,
+        residual: state.missing[problem.local_equations()..].to_vec(),
         loops: state.loops,
         max_error: state.max_error,
         history: solution.history,

@@ -64,12 +64,14 @@ pub fn straighten(
     for (&line, (along, crossing)) in lines.iter().zip(&curves) {
         let edge = match along {
             Some(h) => Some(flat.connectivity.edge(*h)),
-            None => Strip::new(flat, crossing)
-                .and_then(|mut strip| strip.clear(flat, &mut done.flips)),
+            None => {
+                Strip::new(flat, crossing).and_then(|mut strip| strip.clear(flat, &mut done.flips))
+            }
         };
         let is_edge = |e: &EdgeId| flat.correspondences[0].is_base_edge(*e);
         let edge = edge.filter(is_edge);
-        done.edge.push(edge.ok_or(StraightenError::Bent { edge: line })?);
+        done.edge
+            .push(edge.ok_or(StraightenError::Bent { edge: line })?);
     }
     Ok(done)
 }
@@ -293,7 +295,11 @@ mod tests {
                 diagonal(sides)
             };
             let slope = (at(h) - at(-h)) / (2.0 * h);
-            assert!((slope - by[k]).abs() < 1e-8, "{k}: {slope} against {}", by[k]);
+            assert!(
+                (slope - by[k]).abs() < 1e-8,
+                "{k}: {slope} against {}",
+                by[k]
+            );
         }
         assert_eq!(derivatives([a, b, c, [3.0, 0.2]]), None);
     }

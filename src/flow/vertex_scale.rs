@@ -15,53 +15,79 @@
 //!
 //! in whose terms are how far, in the hyperbolic metric, points are moved along the sides beyond what isometries do (the translations of
 //! Capouellez and Zorin, *Seamless parametrization in Penner coordinates*, 2024, section 5; those may have periods along handles beside, which this u does not have).
-//! The constant that is left makes Σ_edges (d_ij − (u_i + u_j)/2) vanish.
+//! The constant that is left, one a piece, makes Σ_edges (d_ij − (u_i + u_j)/2) vanish.
 
 use crate::flow::solve::{SolveError, SymmetricSolver};
 use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{EdgeVec, VertexVec};
+use crate::geometry::disjoint_sets::UnionFind;
+use crate::geometry::ids::{EdgeVec, VertexId, VertexVec};
 
 /// Solutions after the first, each of what the last has left: the first is as good as the condition of the matrix, which grows with the mesh.
 const REFINEMENTS: usize = 2;
 
-/// The u nearest to `change` (natural logarithms of ratios of lengths, one an edge), one a vertex. Connected surfaces only.
+/// The u nearest to `change` (natural logarithms of ratios of lengths, one an edge), one a vertex.
 ///
 /// # Errors
-/// A surface that is not connected or too large for the solver.
+/// A surface that is too large for the solver.
 pub fn nearest_scale(
     c: &Connectivity,
     change: &EdgeVec<f64>,
 ) -> Result<VertexVec<f64>, SolveError> {
-    let unknowns = c.vertex_count().saturating_sub(1);
-    // The last vertex has u = 0 until the constant is known. A loop says nothing.
-    let ends = |e| c.edge_vertices(e).map(|v| v.index() as u32);
-    let is_pair = |&[i, j]: &[u32; 2]| i != j && i.max(j) < unknowns as u32;
-    let pairs: Vec<[u32; 2]> = c.edges().map(ends).filter(is_pair).collect();
+    let mut joined = UnionFind::new(c.vertex_count());
+    for [i, j] in c.edges().map(|e| c.edge_vertices(e)) {
+        joined.join(i.index(), j.index());
+    }
+    let piece: VertexVec<usize> = c.vertices().map(|v| joined.find(v.index())).collect();
+    // One vertex of every piece has u = 0 until the constant is known. A loop says nothing.
+    let mut unknown = VertexVec::filled(None, c.vertex_count());
+    let mut unknowns = 0;
+    for v in c.vertices().filter(|&v| piece[v] != v.index()) {
+        unknown[v] = Some(unknowns as u32);
+        unknowns += 1;
+    }
+    let ends = |e| {
+        let [i, j] = c.edge_vertices(e);
+        (i != j).then(|| [unknown[i], unknown[j]])
+    };
+    let pairs: Vec<[u32; 2]> = c
+        .edges()
+        .filter_map(ends)
+        .filter_map(|[i, j]| Some([i?, j?]))
+        .collect();
     let mut diagonal = vec![0.0; unknowns];
-    for [i, j] in c.edges().map(ends).filter(|[i, j]| i != j) {
-        for v in [i, j] {
-            if let Some(d) = diagonal.get_mut(v as usize) {
-                *d += 2.0;
-            }
-        }
+    for i in c.edges().filter_map(ends).flatten().flatten() {
+        diagonal[i as usize] += 2.0;
     }
     let mut solver = SymmetricSolver::new(unknowns, &pairs)?;
     solver.factorize(&diagonal, &vec![-2.0; pairs.len()])?;
     let mut u = VertexVec::filled(0.0, c.vertex_count());
     for _ in 0..=REFINEMENTS {
-        let mut rest = residual(c, change, &u);
-        rest.truncate(unknowns);
+        let at = residual(c, change, &u);
+        let mut rest = vec![0.0; unknowns];
+        for (i, at) in unknown.iter().zip(&at) {
+            if let Some(i) = i {
+                rest[*i as usize] = *at;
+            }
+        }
         solver.solve(&mut rest);
-        for (u, rest) in u.as_mut_slice().iter_mut().zip(&rest) {
-            *u += rest;
+        for (u, i) in u.as_mut_slice().iter_mut().zip(unknown.iter()) {
+            *u += i.map_or(0.0, |i| rest[i as usize]);
         }
     }
     let left = |e| {
         let [i, j] = c.edge_vertices(e);
         change[e] - 0.5 * (u[i] + u[j])
     };
-    let constant = c.edges().map(left).sum::<f64>() / c.edge_count().max(1) as f64;
-    Ok(u.iter().map(|u| u + constant).collect())
+    let mut constant = VertexVec::filled((0.0, 0.0), c.vertex_count());
+    for e in c.edges() {
+        let (sum, count) = &mut constant[VertexId::new(piece[c.edge_vertices(e)[0]])];
+        (*sum, *count) = (*sum + left(e), *count + 1.0);
+    }
+    let of = |(v, u): (VertexId, &f64)| {
+        let (sum, count): (f64, f64) = constant[VertexId::new(piece[v])];
+        u + sum / count
+    };
+    Ok(u.enumerate().map(of).collect())
 }
 
 /// Minus the gradient of half the sum of squares at `u`.

@@ -11,7 +11,7 @@ use crate::config::Config;
 use crate::flow::prescription::Prescription;
 use crate::flow::refine::ConnectivityRepair;
 use crate::flow::refine::{self, RefineError};
-use crate::flow::ricci::{self, FlatMetric};
+use crate::flow::ricci::{self, FlatMetric, FlowError, Holonomy};
 use crate::geometry::ids::EdgeVec;
 use crate::geometry::mesh::Mesh;
 use crate::observe::Observer;
@@ -43,6 +43,14 @@ pub(super) fn flatten(
     enter: &impl Fn(&'static str) -> Result<(), BuildError>,
 ) -> Result<Flattened, BuildError> {
     enter("connectivity")?;
+    let is_repaired = config.connectivity.is_enabled(&config.flow);
+    if is_repaired && config.flow.holonomy == Holonomy::QuarterTurns {
+        let setting = "connectivity.enabled = true";
+        return Err(BuildError::flow(
+            FlowError::QuarterTurnsWithout { setting },
+            &mesh,
+        ));
+    }
     let (mesh, prescription, connectivity_repair) = refine_for(config, mesh, prescription)?;
     let source_length = edge_lengths(&mesh);
     let c = &mesh.connectivity;

@@ -107,7 +107,13 @@ fn plan(
     offend: &mut impl FnMut(RegionOf),
 ) -> Result<(), BuildError> {
     let mesh = component.mesh?;
-    let prescription = cones::prescribe(&mesh, requests, &config.cones, &config.boundary, &config.features)?;
+    let prescription = cones::prescribe(
+        &mesh,
+        requests,
+        &config.cones,
+        &config.boundary,
+        &config.features,
+    )?;
     let given = existence::decide(&mesh, &prescription, &config.flow)
         .map_err(|e| BuildError::flow(e, &mesh))?;
     if let Some(Verdict::Impossible(violation)) = &given {

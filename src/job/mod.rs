@@ -135,7 +135,13 @@ fn build_component(
     enter("cones")?;
     let frame = component.frame;
     let mesh = component.mesh?;
-    let prescription = cones::prescribe(&mesh, requests, &config.cones, &config.boundary, &config.features)?;
+    let prescription = cones::prescribe(
+        &mesh,
+        requests,
+        &config.cones,
+        &config.boundary,
+        &config.features,
+    )?;
     let (given, given_faces) = (mesh.positions.clone(), mesh.connectivity.to_faces());
     let source = SourceSurface::of(&mesh, &config.images);
     let Flattened {
@@ -325,6 +331,15 @@ fn warnings(atlas: &AffineAtlas, config: &Config) -> Vec<String> {
         notes.push(format!(
             "is drawn unevenly: the log scale deviates by {:.2} (report.distortion_warning = {most}), area distortion (9) is {:.2}; more cones help (`affine-atlas cones` shows how much), `affine-atlas explain` shows where",
             quality.log_scale.std, quality.area_distortion
+        ));
+    }
+    if let Some(met) = &atlas.metric.quarter_turns
+        && !met.given_up.is_empty()
+    {
+        let all = met.lines.len() + met.given_up.len();
+        notes.push(format!(
+            "has {} of {all} features as lines: the others cannot be lines with these, or only in faces without width; atlas.json names them, and a larger features.angle asks for fewer",
+            met.lines.len()
         ));
     }
     let params = &config.patches;

@@ -86,6 +86,15 @@ pub struct MeanMax {
     pub max: f64,
 }
 
+/// Root of the mean square, and maximum.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct RmsMax {
+    /// Root of the mean square.
+    pub rms: f64,
+    /// Greatest magnitude.
+    pub max: f64,
+}
+
 /// The distortion in a word: the standard deviation σ of the log scale, which a factor of e^σ in lengths stands for.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
@@ -125,6 +134,9 @@ pub struct Quality {
     pub verdict: Verdict,
     /// Difference of corner angles, radians.
     pub angle_error: MeanMax,
+    /// How far the metric is from a conformal one, of λ* − λ⁰ − (u_i + u_j) over the edges of the intrinsic Delaunay triangulation; absent where it is conformal by construction.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub conformal_error: Option<RmsMax>,
     /// Worst mismatch of the development, source units.
     pub layout_closing_error: f64,
     /// Length of the cut in space, source units.

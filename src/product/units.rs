@@ -75,6 +75,10 @@ impl AffineAtlas {
         let one = |x: &mut f32| *x = frame.length(f64::from(*x)) as f32;
         let texels = self.images.iter_mut().flat_map(|image| &mut image.position);
         texels.flatten().for_each(one);
+        if let Some(met) = &mut self.metric.quarter_turns {
+            let features = met.lines.iter_mut().chain(&mut met.given_up);
+            features.for_each(|feature| length(&mut feature.length));
+        }
         length(&mut self.connectivity_repair.hausdorff);
         length(&mut self.quality.layout_closing_error);
         length(&mut self.quality.cut_length);

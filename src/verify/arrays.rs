@@ -245,6 +245,12 @@ fn stray_indices(arrays: &Arrays, document: &Document) -> Vec<String> {
         .cones
         .iter()
         .map(|cone| cone.vertex)
+        .chain(
+            document
+                .features
+                .iter()
+                .flat_map(|f| f.vertices.iter().copied()),
+        )
         .chain(document.segments.iter().flat_map(|s| s.vertices.clone()))
         .chain(document.segments.iter().flat_map(|s| [s.from, s.to]))
         .chain(document.charts.iter().filter_map(|chart| chart.vertex))

@@ -62,6 +62,8 @@ pub(super) struct Document {
     pub topology: Topology,
     pub metric: Metric,
     pub cones: Vec<Cone>,
+    #[serde(default)]
+    pub features: Vec<Feature>,
     pub segments: Vec<Segment>,
     pub charts: Vec<Chart>,
     pub transitions: Vec<Transition>,
@@ -104,6 +106,23 @@ pub(super) struct Topology {
 pub(super) struct Metric {
     pub boundary: String,
     pub max_curvature_error: f64,
+    pub holonomy: Option<Holonomy>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Holonomy {
+    pub loops: Vec<Loop>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Loop {
+    pub residual: f64,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Feature {
+    pub vertices: Vec<usize>,
+    pub is_line: bool,
 }
 
 #[derive(Debug, Deserialize)]

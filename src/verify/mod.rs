@@ -20,6 +20,7 @@ mod channels;
 mod charts;
 mod document;
 mod drawing;
+mod features;
 mod formulas;
 mod glb;
 mod grid;
@@ -318,6 +319,7 @@ pub fn verify_atlas(
     let metric = metric::check(&surface, &arrays, &document, angles, options, &mut verdicts);
     let slit = central::check(&surface, &arrays, &document, options, &mut verdicts);
     transitions::check(&surface, &arrays, &document, &slit, &metric, &mut verdicts);
+    features::check(&surface, &arrays, &document, &slit, &mut verdicts);
     charts::check(&surface, &arrays, &document, &slit, &mut verdicts);
     if let Some(source) = source {
         source::check(&arrays, &document, source, &mut verdicts);

@@ -7,6 +7,7 @@ mod command;
 mod dependencies;
 mod documents;
 mod existence;
+mod features;
 mod fit;
 mod flows;
 mod good;
@@ -16,6 +17,8 @@ mod interrupt;
 mod lattice;
 mod packed;
 mod prescriptions;
+#[path = "../real_models/mod.rs"]
+mod real_models;
 mod rebuild;
 mod rectangles;
 mod refusals;

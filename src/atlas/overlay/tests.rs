@@ -328,7 +328,7 @@ impl Case {
             max_curvature_error: 0.0,
             fit: None,
             opened: None,
-            lines: Vec::new(),
+            quarter_turns: None,
         };
         let target = VertexVec::filled(0.0, c.vertex_count());
         let prescription = Prescription::new(target, BoundaryCondition::Free);
@@ -626,7 +626,7 @@ fn broken_correspondences_are_refused() {
             max_curvature_error: 0.0,
             fit: None,
             opened: None,
-            lines: Vec::new(),
+            quarter_turns: None,
         };
         let target = VertexVec::filled(0.0, c.vertex_count());
         let prescription = Prescription::new(target, BoundaryCondition::Free);

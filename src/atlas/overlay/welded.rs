@@ -102,7 +102,11 @@ impl Weld<'_> {
 
     fn vertices<T: Copy>(&self, value: &VertexVec<T>, own: &VertexVec<T>) -> VertexVec<T> {
         let added = value.iter().skip(self.opened.vertex.len());
-        own.iter().take(self.vertices).chain(added).copied().collect()
+        own.iter()
+            .take(self.vertices)
+            .chain(added)
+            .copied()
+            .collect()
     }
 
     fn connectivity(&self, c: &Connectivity) -> Result<Connectivity, OverlayError> {

@@ -36,6 +36,9 @@ pub struct Document {
     pub metric: Metric,
     /// Vertices of prescribed curvature.
     pub cones: Vec<Cone>,
+    /// Features that were asked for; absent where there are none.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub features: Vec<Feature>,
     /// Segments of the cut graph with their gluings.
     pub segments: Vec<Segment>,
     /// Charts; number 0 is the central one.
@@ -163,8 +166,44 @@ pub struct Metric {
     /// How well a circle packing keeps the lengths in space; absent for other schemes.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub fit: Option<PackingFit>,
+    /// What is prescribed of loops; absent where they are free.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub holonomy: Option<Holonomy>,
     /// One entry an iteration.
     pub history: Vec<FlowStep>,
+}
+
+/// What is prescribed of loops, and how it was met.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct Holonomy {
+    /// One entry an independent loop.
+    pub loops: Vec<Loop>,
+    /// How much cheaper a change of scale was than one of shape.
+    pub conformality: f64,
+    /// Number of quarter turns that were moved between vertices so that a grid can have the cones of the field.
+    pub adjusted: usize,
+}
+
+/// An independent loop.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct Loop {
+    /// By how many quarter turns it turns.
+    pub turns: i64,
+    /// By how much it misses that, radians.
+    pub residual: f64,
+}
+
+/// A chain of sharp edges, or between materials.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct Feature {
+    /// Its vertices in order, rows of `positions`; the first is the last again where it is closed.
+    pub vertices: Vec<usize>,
+    /// Length in space, source units.
+    pub length: f64,
+    /// Mean angle between the normals of both sides, radians.
+    pub angle: f64,
+    /// Whether it is a straight line of the atlas, parallel to one of the axes up to quarter turns.
+    pub is_line: bool,
 }
 
 /// A vertex of prescribed curvature.

@@ -70,6 +70,7 @@ pub fn describe(atlas: &AffineAtlas, provenance: &Provenance) -> Result<Document
         connectivity: atlas.connectivity_repair,
         metric: metric(atlas),
         cones: cones(atlas),
+        features: features(atlas),
         segments: segments(atlas),
         charts: charts(atlas),
         transitions: transitions(atlas),
@@ -126,8 +127,30 @@ fn metric(atlas: &AffineAtlas) -> Metric {
         curvature_tolerance: atlas.flow.curvature_tolerance,
         limited_by_float64: atlas.limited_by_float64(),
         fit: atlas.metric.fit,
+        holonomy: atlas.metric.quarter_turns.as_ref().map(|met| Holonomy {
+            loops: (met.loops.iter())
+                .map(|&(turns, residual)| Loop { turns, residual })
+                .collect(),
+            conformality: atlas.flow.conformality,
+            adjusted: met.adjusted,
+        }),
         history: history.clone(),
     }
+}
+
+fn features(atlas: &AffineAtlas) -> Vec<Feature> {
+    let Some(met) = &atlas.metric.quarter_turns else {
+        return Vec::new();
+    };
+    let lines = met.lines.iter().map(|f| (f, true));
+    let all = lines.chain(met.given_up.iter().map(|f| (f, false)));
+    all.map(|(feature, is_line)| Feature {
+        vertices: feature.vertices.iter().map(|v| v.index()).collect(),
+        length: feature.length,
+        angle: feature.angle,
+        is_line,
+    })
+    .collect()
 }
 
 /// What the images hold, unless it is what they hold by default.

@@ -135,7 +135,7 @@ fn torus(n: u32, m: u32, k: f64) -> AffineAtlas {
             max_curvature_error: 1e-12,
             fit: None,
             opened: None,
-            lines: Vec::new(),
+            quarter_turns: None,
         },
         cut: CutGraph {
             is_cut: segment.iter().map(|&s| s != NONE).collect(),

@@ -45,10 +45,7 @@ pub(super) fn select(
     }
 }
 
-fn along(
-    mesh: &Mesh,
-    features: &[Feature],
-) -> Result<(Vec<RequestedCone>, FromField), ConeError> {
+fn along(mesh: &Mesh, features: &[Feature]) -> Result<(Vec<RequestedCone>, FromField), ConeError> {
     let c = &mesh.connectivity;
     let source_length: EdgeVec<f64> = c.edges().map(|e| mesh.edge_length(e)).collect();
     let edges: Vec<EdgeId> = features.iter().flat_map(|f| &f.edges).copied().collect();
@@ -63,7 +60,7 @@ fn along(
     let area = own.faces().map(|f| triangle::area(sides(f)).unwrap_or(0.0));
     let area: FaceVec<f64> = area.collect();
     let mut field = cross_field(own, &angle, &area)?;
-    let (signature, _) = field.grid_signature(&surface, &angle, LEAST_QUARTERS)?;
+    let (signature, adjusted) = field.grid_signature(&surface, &angle, LEAST_QUARTERS)?;
     let flat = |v: VertexId| match c.is_boundary_vertex(v) {
         true => FULL_TURN / 2,
         false => FULL_TURN,
@@ -89,7 +86,10 @@ fn along(
         let whole = surface.connectivity;
         let side = whole.edge_halfedge(ground.base.edge(h));
         let is_own = |h: &HalfedgeId| h.index() < own.halfedge_count();
-        Some(side).filter(is_own).or(whole.twin(side)).unwrap_or(side)
+        Some(side)
+            .filter(is_own)
+            .or(whole.twin(side))
+            .unwrap_or(side)
     };
     let sides_of = |feature: &Feature| {
         let halfedges = feature.edges.iter().map(|&e| c.edge_halfedge(e));
@@ -101,6 +101,7 @@ fn along(
         features: Vec::new(),
         field,
         signature,
+        adjusted,
     };
     Ok((cones, found))
 }

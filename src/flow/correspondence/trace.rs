@@ -61,7 +61,8 @@ impl Correspondence {
         runs: &[HalfedgeId],
     ) -> Result<Vec<(Option<HalfedgeId>, Vec<Crossing>)>, CorrespondenceError> {
         let count = self.crossings()?;
-        let total = u32::try_from(count).map_err(|_| CorrespondenceError::TooManyCrossings { count });
+        let total =
+            u32::try_from(count).map_err(|_| CorrespondenceError::TooManyCrossings { count });
         let total = total? as usize;
         let tracer = Tracer::new(self, base, current)?;
         let follow = |&b: &HalfedgeId| {

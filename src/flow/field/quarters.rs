@@ -107,7 +107,11 @@ impl<'a> Angles<'a> {
             sectors[of] += 1;
         }
         let mut is_feature = EdgeVec::filled(false, surface.connectivity.edge_count());
-        surface.glued.iter().flatten().for_each(|&e| is_feature[e] = true);
+        surface
+            .glued
+            .iter()
+            .flatten()
+            .for_each(|&e| is_feature[e] = true);
         let mut is_border = VertexVec::filled(false, vertex.len());
         for h in c.halfedges().filter(|&h| c.twin(h).is_none()) {
             if !is_feature[surface.connectivity.edge(h)] {

@@ -21,6 +21,8 @@ impl Fielded {
             length: self.length.clone(),
             half: None,
             loops: self.loops.clone(),
+            sector: None,
+            glued: Vec::new(),
         }
     }
 }

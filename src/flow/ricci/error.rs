@@ -5,10 +5,10 @@ use crate::flow::field::FieldError;
 use crate::flow::looped::LoopedError;
 use crate::flow::packing::PackingError;
 use crate::flow::pi_multiple::in_pi;
-use crate::flow::straighten::StraightenError;
 use crate::flow::schemes::Scheme;
 use crate::flow::seamless::SeamlessError;
 use crate::flow::solve::SolveError;
+use crate::flow::straighten::StraightenError;
 use crate::geometry::connectivity::ConnectivityError;
 use crate::geometry::ids::{EdgeId, FaceId, VertexId};
 
@@ -88,7 +88,7 @@ pub enum FlowError {
     },
     /// Quarter turns are found by flips alone.
     #[error(
-        "flow.holonomy = \"quarter-turns\" contradicts {setting}: it needs flow.scheme = \"vertex-scaling\", flow.delaunay = true and flow.solver = \"newton\""
+        "flow.holonomy = \"quarter-turns\" contradicts {setting}: it needs flow.scheme = \"vertex-scaling\", flow.delaunay = true, flow.solver = \"newton\" and no connectivity.enabled"
     )]
     QuarterTurnsWithout {
         /// The key and its value.

@@ -7,6 +7,21 @@ use crate::flow::packing::PackingFit;
 use crate::flow::step::FlowStep;
 use crate::geometry::ids::{EdgeVec, VertexVec};
 
+/// How a metric whose transitions are quarter turns was met.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct QuarterTurns {
+    /// By how many quarter turns each independent loop turns, and by how much it misses that, radians.
+    pub loops: Vec<(i64, f64)>,
+    /// Root of the mean square and maximum of λ* − λ⁰ − (u_i + u_j) over the edges of B: 0 where the metric is conformal.
+    pub conformal_error: [f64; 2],
+    /// Number of quarter turns that were moved from vertex to vertex so that a grid can have the cones of the field.
+    pub adjusted: usize,
+    /// The features that are straight lines.
+    pub lines: Vec<Feature>,
+    /// Those that could not be.
+    pub given_up: Vec<Feature>,
+}
+
 /// A flat metric with cones, and how it was reached.
 #[derive(Clone, Debug)]
 pub struct FlatMetric {
@@ -25,8 +40,8 @@ pub struct FlatMetric {
     pub max_curvature_error: f64,
     /// How the surface was cut open along the features that are straight lines; vertices of `intrinsic` are sectors then. `None` where there are none.
     pub opened: Option<Box<Opened>>,
-    /// The features among those prescribed that are straight lines.
-    pub lines: Vec<Feature>,
+    /// Where the turnings of loops were prescribed too, how they were met.
+    pub quarter_turns: Option<Box<QuarterTurns>>,
     /// Fit of the packing, for circle packings that have one.
     pub fit: Option<PackingFit>,
 }

@@ -103,7 +103,7 @@ pub(super) fn flow(
         max_curvature_error,
         fit: None,
         opened: None,
-        lines: Vec::new(),
+        quarter_turns: None,
         intrinsic: Some(Box::new(ground.leave(
             surface.connectivity.face_count(),
             delaunay,

@@ -34,7 +34,7 @@ pub use crate::flow::packing::PackingFit;
 pub use crate::flow::schemes::Scheme;
 pub use crate::flow::step::FlowStep;
 pub use error::{FlowError, Method};
-pub use flat_metric::FlatMetric;
+pub use flat_metric::{FlatMetric, QuarterTurns};
 pub use params::{FlowParams, Holonomy, Solver};
 
 use crate::flow::feasibility::{self, Constraint};
@@ -227,6 +227,6 @@ fn finish(
         max_curvature_error,
         fit: structure.fit,
         opened: None,
-        lines: Vec::new(),
+        quarter_turns: None,
     })
 }

@@ -9,7 +9,7 @@
 //! what loops turn in the conformal metric with these cones, which is found first: so little is left to change.
 
 use super::error::FlowError;
-use super::flat_metric::FlatMetric;
+use super::flat_metric::{FlatMetric, QuarterTurns};
 use super::flipping::{self, Surface};
 use super::params::FlowParams;
 use crate::flow::correspondence::Correspondence;
@@ -88,7 +88,7 @@ fn with_cones(
     let log_length = found.penner.iter().map(|l| 0.5 * l).collect();
     let log_length = ground.on_delaunay(log_length);
     let metric = with_lengths(c, ground, log_length, &[])?;
-    Ok(recorded(metric, &found))
+    Ok(recorded(metric, found, &signature, QuarterTurns::default()))
 }
 
 /// Cones and turnings of a field, with as many of its features as lines as Newton's method can meet.
@@ -119,9 +119,8 @@ fn along_features(
             None => params.max_newton_steps,
         };
         let found = match solved(&on, &log_length, &signature, params, max_steps, observer) {
-            Err(SeamlessError::Stalled { missing, iterations, max_error, step, .. }) if held().next().is_some() => {
+            Err(SeamlessError::Stalled { missing, .. }) if held().next().is_some() => {
                 let which = hardest(&from.features, &is_held, &opened, &missing);
-                tracing::info!("given up {which} of {}: {} edges; {iterations} steps, {max_error:.2e}, {step:.1e}", held().count(), from.features[which].edges.len());
                 is_held[which] = false;
                 continue;
             }
@@ -129,16 +128,23 @@ fn along_features(
         };
         let glued = on.glued.concat();
         let lines: Vec<Feature> = held().cloned().collect();
+        let (features, is_held) = (from.features.iter(), is_held.iter());
+        let given_up = features.zip(is_held).filter(|(_, held)| !**held);
+        let met = QuarterTurns {
+            adjusted: from.adjusted,
+            given_up: given_up.map(|(f, _)| f.clone()).collect(),
+            lines,
+            ..QuarterTurns::default()
+        };
         let log_length = found.penner.iter().map(|l| 0.5 * l).collect();
         let log_length = ground.on_delaunay(log_length);
         let mut metric = with_lengths(&opened.connectivity, ground, log_length, &glued)?;
-        if !lines.is_empty() {
+        if !met.lines.is_empty() {
             metric.log_scale = joined_scale(&metric.log_scale, &opened, c.vertex_count());
             metric.curvature = joined_curvature(&metric.curvature, &opened, c);
-            metric.lines = lines;
             metric.opened = Some(Box::new(opened));
         }
-        return Ok(recorded(metric, &found));
+        return Ok(recorded(metric, found, &signature, met));
     }
 }
 
@@ -164,11 +170,7 @@ fn hardest(
 }
 
 /// The signature of a field on a surface where some features are not cut open.
-fn without(
-    from: &FromField,
-    is_held: &[bool],
-    on: &LoopedSurface,
-) -> Result<Signature, FlowError> {
+fn without(from: &FromField, is_held: &[bool], on: &LoopedSurface) -> Result<Signature, FlowError> {
     let sides = from.sides.iter().zip(is_held);
     let glued = sides.filter(|(_, held)| !**held).flat_map(|(s, _)| s);
     let field = from.field.glued(&glued.copied().collect::<Vec<_>>());
@@ -232,12 +234,24 @@ fn solved(
     seamless(&start, &on.loops, signature, &params, observer)
 }
 
-fn recorded(metric: FlatMetric, found: &SeamlessMetric) -> FlatMetric {
-    FlatMetric {
-        history: found.history.iter().map(line).collect(),
-        max_curvature_error: found.max_error,
-        ..metric
+/// The metric with the record of how it was found.
+fn recorded(
+    mut metric: FlatMetric,
+    found: SeamlessMetric,
+    signature: &Signature,
+    met: QuarterTurns,
+) -> FlatMetric {
+    metric.history = found.history.iter().map(line).collect();
+    metric.max_curvature_error = found.max_error;
+    if let Some(record) = &mut metric.quarter_turns {
+        let turns = signature.turning.iter().copied();
+        **record = QuarterTurns {
+            loops: turns.zip(found.residual).collect(),
+            conformal_error: record.conformal_error,
+            ..met
+        };
     }
+    metric
 }
 
 /// The metric that B has with other lengths (natural logarithms, Penner coordinates), whose Delaunay triangulation must be flat but for cones, and symmetric on a
@@ -255,6 +269,7 @@ pub(crate) fn with_lengths(
         // Vertices are those of the double as it was made, whatever was flipped.
         u = Reflection::new(&ground.base, surface.face_count()).mean(&u);
     }
+    let conformal_error = conformal_error(&ground.delaunay, &change, &u);
     let delaunay_penner = at_unit_scale(&ground.delaunay, &log_length, &u);
     let (mut flat, mut shape) = flipped(&ground, log_length);
     if !lines.is_empty() {
@@ -283,7 +298,10 @@ pub(crate) fn with_lengths(
         max_curvature_error: 0.0,
         fit: None,
         opened: None,
-        lines: Vec::new(),
+        quarter_turns: Some(Box::new(QuarterTurns {
+            conformal_error,
+            ..QuarterTurns::default()
+        })),
         intrinsic: Some(Box::new(ground.leave(
             surface.face_count(),
             flat,
@@ -292,6 +310,21 @@ pub(crate) fn with_lengths(
             Some(delaunay_penner),
         ))),
     })
+}
+
+/// Root of the mean square and maximum of λ* − λ⁰ − (u_i + u_j) over all edges; `change`: of half the λ.
+fn conformal_error(c: &Connectivity, change: &EdgeVec<f64>, u: &VertexVec<f64>) -> [f64; 2] {
+    let of = |(e, change): (EdgeId, &f64)| {
+        let [i, j] = c.edge_vertices(e);
+        2.0 * change - (u[i] + u[j])
+    };
+    let (sum, most) = change
+        .enumerate()
+        .map(of)
+        .fold((0.0, 0.0), |(sum, most), x| {
+            (sum + x * x, f64::max(most, x.abs()))
+        });
+    [(sum / c.edge_count().max(1) as f64).sqrt(), most]
 }
 
 /// Curvatures in quarter turns.

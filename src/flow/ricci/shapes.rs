@@ -8,6 +8,7 @@ use std::f64::consts::PI;
 use std::path::PathBuf;
 
 /// A surface as the flow sees it, with positions for areas only.
+#[derive(Clone)]
 pub(crate) struct Shape {
     pub name: String,
     pub connectivity: Connectivity,
@@ -47,7 +48,7 @@ impl Shape {
             target,
             cones: list,
             boundary: BoundaryCondition::Free,
-            turning: None,
+            field: None,
         }
     }
 

@@ -170,7 +170,9 @@ impl<'a> Problem<'a> {
                 theta[v] -= angle;
             }
         }
-        let unequal = glued.iter().map(|&[h, t]| 2.0 * (log_length[t] - log_length[h]));
+        let unequal = glued
+            .iter()
+            .map(|&[h, t]| 2.0 * (log_length[t] - log_length[h]));
         let unequal: Vec<f64> = unequal.collect();
         let turning = loops.turning(&c, |corner| shape[c.face(corner)].angle[c.corner(corner)]);
         let turning = self.turning.iter().zip(turning).map(|(to, now)| to - now);
@@ -188,7 +190,9 @@ impl<'a> Problem<'a> {
             let (total, count): (f64, f64) = sum[self.piece[v]];
             total / count
         };
-        let cones = theta.enumerate().filter(|&(v, _)| self.equation[v].is_some());
+        let cones = theta
+            .enumerate()
+            .filter(|&(v, _)| self.equation[v].is_some());
         let mut missing: Vec<f64> = cones.map(|(v, x)| x - mean(v)).collect();
         missing.extend(&unequal);
         missing.extend(&turning);

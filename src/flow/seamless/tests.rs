@@ -16,6 +16,7 @@ use crate::geometry::triangle;
 use std::f64::consts::FRAC_PI_2;
 
 mod borders;
+mod lines;
 mod oracle;
 mod signatures;
 
@@ -49,6 +50,8 @@ fn prepare(shape: &Shape) -> Prepared {
         length: length.clone(),
         half: None,
         loops: loops.clone(),
+        sector: None,
+        glued: Vec::new(),
     };
     let signature = field.grid_signature(&looped, &angle, 3).unwrap().0;
     Prepared {
@@ -66,12 +69,13 @@ fn closed<'a>(connectivity: &'a Connectivity, length: &'a EdgeVec<f64>) -> Start
         length,
         log_length: None,
         reflection: None,
+        glued: &[],
     }
 }
 
 impl Prepared {
     fn problem(&self) -> Problem<'_> {
-        Problem::new(&self.c, &self.loops, &self.signature, None)
+        Problem::new(&closed(&self.c, &self.length), &self.loops, &self.signature)
     }
 
     fn start(&self) -> EdgeVec<f64> {
@@ -235,7 +239,8 @@ fn derivatives_by_scales_are_sums_of_those_by_lengths() {
     let state = problem.evaluate(&disturbed(&prepared.start(), 0.8, &mut random));
     assert!(state.flips.len() > 20);
     let equations = problem.equations();
-    let (by_edges, by_scales) = (state.by_edges(&problem), state.by_scales(&problem));
+    let by_edges = state.by_edges(&problem);
+    let by_scales = state.by_scales(&problem, &by_edges);
     let u: VertexVec<f64> = prepared.c.vertices().map(|_| random()).collect();
     let ends = |e: EdgeId| prepared.c.edge_vertices(e).map(|v| u[v]);
     let sums: EdgeVec<f64> = prepared

@@ -126,7 +126,13 @@ pub fn mesh(path: &Path, config: &Config) -> Result<Explanation, BuildError> {
 fn flat(component: Component, requests: &Requests, config: &Config) -> Result<Flat, BuildError> {
     let frame = component.frame;
     let mesh = component.mesh?;
-    let prescription = cones::prescribe(&mesh, requests, &config.cones, &config.boundary, &config.features)?;
+    let prescription = cones::prescribe(
+        &mesh,
+        requests,
+        &config.cones,
+        &config.boundary,
+        &config.features,
+    )?;
     let Flattened {
         mesh,
         metric,

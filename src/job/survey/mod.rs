@@ -230,7 +230,13 @@ impl Task<'_> {
         })?;
         let config = with_cones(self.config, strategy, asked);
         let requests = self.requests(&config)?;
-        let chosen = cones::prescribe(mesh, &requests, &config.cones, &config.boundary, &config.features)?;
+        let chosen = cones::prescribe(
+            mesh,
+            &requests,
+            &config.cones,
+            &config.boundary,
+            &config.features,
+        )?;
         let specs = self.written(mesh, &chosen.cones);
         let prescription = match &specs {
             Some(list) if !list.is_empty() => self.listed(mesh, &config, list)?,

@@ -43,6 +43,7 @@ impl Bounded {
             length: &on.length,
             log_length: Some(&self.log_length),
             reflection: on.reflection(),
+            glued: &on.glued,
         }
     }
 
@@ -120,7 +121,11 @@ fn the_symmetric_step_is_that_of_the_whole_double() {
         for conformality in [0.0, 3.0] {
             let norm = Norm::by_area(on.connectivity, &on.length, conformality);
             let step = |on: &LoopedSurface, signature, reflection, norm: &Norm| {
-                let problem = Problem::new(on.connectivity, &on.loops, signature, reflection);
+                let start = Start {
+                    reflection,
+                    ..bounded.start(on)
+                };
+                let problem = Problem::new(&start, &on.loops, signature);
                 let state = problem.evaluate(&bounded.penner());
                 let mut normal = Normal::new(&problem, &state, norm, None).unwrap();
                 normal.direction(&problem, norm, &state.missing).0
@@ -146,7 +151,7 @@ fn the_jacobian_of_symmetric_changes_agrees_with_finite_differences() {
         let on = bounded.looped();
         let reflection = on.reflection().unwrap();
         let signature = signature(&on);
-        let problem = Problem::new(on.connectivity, &on.loops, &signature, Some(reflection));
+        let problem = Problem::new(&bounded.start(&on), &on.loops, &signature);
         let penner = reflection.symmetric(&disturbed(&bounded.penner(), 0.8, &mut random));
         let state = problem.evaluate(&penner);
         assert!(state.flips.len() > 20);

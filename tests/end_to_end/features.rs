@@ -1,0 +1,82 @@
+//! Sharp edges as lines of the atlas, on a part with junctions of three and four of them.
+
+use crate::command::{build_small, verify};
+use crate::real_models::lines::lines;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+const SEAMLESS: [&str; 2] = ["cones.strategy=field", "flow.holonomy=quarter-turns"];
+
+/// Edges along the side of a cube.
+const DIVISIONS: i32 = 8;
+
+/// Four cubes in an L with one on top, such that at one corner four sharp edges meet, bent so that nothing is flat.
+fn part() -> String {
+    let cubes = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 1]];
+    let mut number: BTreeMap<[i32; 3], usize> = BTreeMap::new();
+    let mut faces = Vec::new();
+    for cube in cubes {
+        for axis in 0..3 {
+            for up in [0, 1] {
+                let mut beyond = cube;
+                beyond[axis] += 2 * up - 1;
+                if cubes.contains(&beyond) {
+                    continue;
+                }
+                for i in 0..DIVISIONS {
+                    for j in 0..DIVISIONS {
+                        let corner = |di: i32, dj: i32| {
+                            let mut p = cube.map(|c| c * DIVISIONS);
+                            p[axis] += up * DIVISIONS;
+                            p[(axis + 1) % 3] += i + di;
+                            p[(axis + 2) % 3] += j + dj;
+                            p
+                        };
+                        let quad = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
+                        let quad = quad.map(|p| {
+                            let next = number.len() + 1;
+                            *number.entry(p).or_insert(next)
+                        });
+                        let [a, b, c, d] = quad;
+                        let pair = if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
+                        faces.extend(pair.map(|[p, q, r]| if up == 1 { [p, q, r] } else { [p, r, q] }));
+                    }
+                }
+            }
+        }
+    }
+    let mut points: Vec<([i32; 3], usize)> = number.into_iter().collect();
+    points.sort_by_key(|(_, n)| *n);
+    let mut text = String::new();
+    for (p, _) in points {
+        let [x, y, z] = p.map(|c| f64::from(c) / f64::from(DIVISIONS));
+        let (s, c) = (0.35 * z + 0.1 * x).sin_cos();
+        let grown = 1.0 + 0.15 * (1.7 * y + z).sin();
+        let bent = [c * x - s * y, s * x + c * y, z * grown + 0.1 * x * x];
+        writeln!(text, "v {} {} {}", bent[0], bent[1], bent[2]).unwrap();
+    }
+    for [a, b, c] in faces {
+        writeln!(text, "f {a} {b} {c}").unwrap();
+    }
+    text
+}
+
+#[test]
+fn sharp_edges_of_a_part_are_lines() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mesh = folder.path().join("part.obj");
+    std::fs::write(&mesh, part()).expect("writable");
+    let built = build_small(&mesh, &SEAMLESS);
+    assert_eq!(built.code(), Some(0), "{}", built.message());
+    let atlas = built.atlas();
+    verify(&atlas);
+    let found = lines(&atlas);
+    assert!(found.chains > 20, "{found:?}");
+    assert!(found.junctions.contains_key(&3) && found.junctions.contains_key(&4), "{found:?}");
+    assert!(found.share() >= 0.95, "{:.3}: {found:?}", found.share());
+    assert!(found.named >= found.length - found.on_lines - 1e-9 * found.length, "{found:?}");
+    // Without them only what follows the field by chance is straight.
+    let without = build_small(&mesh, &[&SEAMLESS[..], &["features.angle=180"]].concat());
+    let free = lines(&without.atlas());
+    assert!(free.share() < 0.5, "{:.3}: {free:?}", free.share());
+}
