@@ -10,7 +10,7 @@
 use super::correspondence::{CorrespondenceError, Crossing};
 use super::delaunay::Delaunay;
 use crate::geometry::connectivity::{Connectivity, Flip};
-use crate::geometry::ids::{EdgeId, HalfedgeId};
+use crate::geometry::ids::{EdgeId, FaceId, FaceVec, HalfedgeId};
 use std::collections::VecDeque;
 
 /// A flip that keeps the metric, and how the new length depends on the old ones.
@@ -60,20 +60,43 @@ pub fn straighten(
     let Some(integers) = flat.correspondences.first() else {
         return Ok(done);
     };
-    let curves = integers.follow(base, &flat.connectivity, &runs)?;
-    for (&line, (along, crossing)) in lines.iter().zip(&curves) {
+    let c = &flat.connectivity;
+    let curves = integers.follow(base, c, &runs)?;
+    let along = |h: Option<HalfedgeId>| h.map(|h| c.edge(h));
+    let curves: Vec<_> = (curves.into_iter())
+        .map(|(h, crossing)| (along(h), crossing))
+        .collect();
+    // Faces that flips have changed: what was said of lines through them is out of date.
+    let mut is_changed = FaceVec::filled(false, c.face_count());
+    for ((&line, run), (along, mut crossing)) in lines.iter().zip(runs).zip(curves) {
+        let before = done.flips.len();
         let edge = match along {
-            Some(h) => Some(flat.connectivity.edge(*h)),
+            Some(edge) => Some(edge),
             None => {
-                Strip::new(flat, crossing).and_then(|mut strip| strip.clear(flat, &mut done.flips))
+                let c = &flat.connectivity;
+                let mut faces = crossing.iter().flat_map(|x| faces_beside(c, x.halfedge));
+                if faces.any(|f| is_changed[f]) {
+                    let again = flat.correspondences[0].follow(base, c, &[run])?;
+                    crossing = again.into_iter().flat_map(|(_, x)| x).collect();
+                }
+                let strip = Strip::new(flat, &crossing);
+                strip.and_then(|mut strip| strip.clear(flat, &mut done.flips))
             }
         };
+        for flip in &done.flips[before..] {
+            let changed = faces_beside(&flat.connectivity, flip.flip.h);
+            changed.into_iter().for_each(|f| is_changed[f] = true);
+        }
         let is_edge = |e: &EdgeId| flat.correspondences[0].is_base_edge(*e);
         let edge = edge.filter(is_edge);
         done.edge
             .push(edge.ok_or(StraightenError::Bent { edge: line })?);
     }
     Ok(done)
+}
+
+fn faces_beside(c: &Connectivity, h: HalfedgeId) -> [FaceId; 2] {
+    [h, c.twin(h).unwrap_or(h)].map(|h| c.face(h))
 }
 
 /// On which side of the line a corner of the polygon lies.

@@ -38,8 +38,14 @@ fn part() -> String {
                             *number.entry(p).or_insert(next)
                         });
                         let [a, b, c, d] = quad;
-                        let pair = if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
-                        faces.extend(pair.map(|[p, q, r]| if up == 1 { [p, q, r] } else { [p, r, q] }));
+                        let pair = if (i + j) % 2 == 0 {
+                            [[a, b, c], [a, c, d]]
+                        } else {
+                            [[a, b, d], [b, c, d]]
+                        };
+                        faces.extend(
+                            pair.map(|[p, q, r]| if up == 1 { [p, q, r] } else { [p, r, q] }),
+                        );
                     }
                 }
             }
@@ -72,9 +78,15 @@ fn sharp_edges_of_a_part_are_lines() {
     verify(&atlas);
     let found = lines(&atlas);
     assert!(found.chains > 20, "{found:?}");
-    assert!(found.junctions.contains_key(&3) && found.junctions.contains_key(&4), "{found:?}");
+    assert!(
+        found.junctions.contains_key(&3) && found.junctions.contains_key(&4),
+        "{found:?}"
+    );
     assert!(found.share() >= 0.95, "{:.3}: {found:?}", found.share());
-    assert!(found.named >= found.length - found.on_lines - 1e-9 * found.length, "{found:?}");
+    assert!(
+        found.named >= found.length - found.on_lines - 1e-9 * found.length,
+        "{found:?}"
+    );
     // Without them only what follows the field by chance is straight.
     let without = build_small(&mesh, &[&SEAMLESS[..], &["features.angle=180"]].concat());
     let free = lines(&without.atlas());

@@ -119,6 +119,16 @@ fn along_features(
             None => params.max_newton_steps,
         };
         let found = match solved(&on, &log_length, &signature, params, max_steps, observer) {
+            Err(SeamlessError::NoLine { edge }) => {
+                let ends = on.connectivity.edge_vertices(edge);
+                let ends = ends.map(|sector| opened.vertex[sector]);
+                let has_it = |f: &Feature| ends.iter().all(|v| f.vertices.contains(v));
+                let which = from.features.iter().zip(&is_held);
+                let which = which.into_iter().rposition(|(f, held)| *held && has_it(f));
+                let which = which.ok_or(SeamlessError::NoLine { edge })?;
+                is_held[which] = false;
+                continue;
+            }
             Err(SeamlessError::Stalled { missing, .. }) if held().next().is_some() => {
                 let which = hardest(&from.features, &is_held, &opened, &missing);
                 is_held[which] = false;

@@ -62,6 +62,14 @@ pub enum SeamlessError {
         /// How many.
         faces: usize,
     },
+    /// The side of a feature is no straight line where Newton begins.
+    #[error(
+        "edge {edge} cannot be made a straight line, since faces beside it have no width in float64's 16 digits: remove them from the mesh, or ask for fewer features (features.angle)"
+    )]
+    NoLine {
+        /// Edge of the triangulation given.
+        edge: EdgeId,
+    },
     /// The linear system could not be solved.
     #[error(transparent)]
     Solve(#[from] SolveError),

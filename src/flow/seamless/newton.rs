@@ -53,6 +53,9 @@ pub(super) fn solve(
 ) -> Result<Solution, SeamlessError> {
     let mut penner = start;
     let mut state = problem.evaluate(&penner);
+    if let Some(edge) = state.bent {
+        return Err(SeamlessError::NoLine { edge });
+    }
     let mut record = SeamlessStep::default();
     let mut history = vec![record.at(&state)];
     let mut last: Option<Normal> = None;

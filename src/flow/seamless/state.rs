@@ -9,7 +9,7 @@ use crate::flow::delaunay::{Delaunay, PtolemyFlip};
 use crate::flow::holonomy::DualLoops;
 use crate::flow::schemes::FaceShape;
 use crate::flow::signature::Signature;
-use crate::flow::straighten::{EuclidFlip, Straightened, straighten};
+use crate::flow::straighten::{EuclidFlip, StraightenError, Straightened, straighten};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::disjoint_sets::UnionFind;
 use crate::geometry::ids::{EdgeId, EdgeVec, FaceVec, VertexId, VertexVec};
@@ -53,6 +53,8 @@ pub(super) struct State {
     pub(super) flips: Vec<PtolemyFlip>,
     /// From there to this one, which has the sides of features as edges.
     pub(super) straightened: Vec<EuclidFlip>,
+    /// A side of a feature that could not be made an edge, if there is one.
+    pub(super) bent: Option<EdgeId>,
     /// The sides of features.
     pub(super) glued: Vec<[EdgeId; 2]>,
     /// By how much the angles miss, radians: every vertex with an equation; by how much λ of the sides of features differ; the loops.
@@ -130,13 +132,16 @@ impl<'a> Problem<'a> {
         missing
     }
 
-    /// The edges that the sides of features have become; flips that keep the metric where they are none.
-    fn sides(&self, delaunay: &mut Delaunay) -> Option<Straightened> {
-        let sides: Vec<EdgeId> = self.glued.iter().flatten().copied().collect();
-        match self.identity {
-            Some(_) => straighten(delaunay, self.base, &sides).ok(),
-            None => Some(Straightened::default()),
-        }
+    /// The edges that the sides of features have become; flips that keep the metric where they are none. Or a side that cannot be made an edge.
+    fn sides(&self, delaunay: &mut Delaunay) -> Result<Straightened, EdgeId> {
+        let sides = self.glued.as_flattened();
+        let Some(&first) = sides.first() else {
+            return Ok(Straightened::default());
+        };
+        straighten(delaunay, self.base, sides).map_err(|error| match error {
+            StraightenError::Bent { edge } => edge,
+            StraightenError::Correspondence(_) => first,
+        })
     }
 
     /// Flips to Delaunay and measures.
@@ -150,13 +155,17 @@ impl<'a> Problem<'a> {
         delaunay.evaluate(&still, &mut shape);
         let flips = delaunay.record.take().unwrap_or_default();
         let sides = self.sides(&mut delaunay);
-        let is_straight = sides.is_some();
+        let bent = sides.as_ref().err().copied();
         let sides = sides.unwrap_or_default();
         if !sides.flips.is_empty() {
             delaunay.update_shapes(&still, &mut shape);
         }
-        let glued = sides.edge.chunks_exact(2).map(|pair| [pair[0], pair[1]]);
-        let glued: Vec<[EdgeId; 2]> = glued.collect();
+        let glued: Vec<[EdgeId; 2]> = match bent.is_none() {
+            true => (sides.edge.chunks_exact(2))
+                .map(|pair| [pair[0], pair[1]])
+                .collect(),
+            false => self.glued.to_vec(),
+        };
         let log_length = delaunay.log_lengths();
         let c = delaunay.connectivity;
         let mut loops = self.loops.clone();
@@ -179,7 +188,7 @@ impl<'a> Problem<'a> {
         let turning: Vec<f64> = turning.collect();
         let errors = theta.iter().chain(&unequal).chain(&turning);
         let largest = errors.clone().fold(0.0, |m: f64, x| m.max(x.abs()));
-        let is_finite = is_straight && errors.clone().all(|x| x.is_finite());
+        let is_finite = bent.is_none() && errors.clone().all(|x| x.is_finite());
         // Zero but for π in float64 being too small, which comes to 1e-11 on 50,000 vertices and must not gather at the first.
         let mut sum = VertexVec::filled((0.0, 0.0), theta.len());
         for (v, x) in theta.enumerate() {
@@ -202,6 +211,7 @@ impl<'a> Problem<'a> {
             loops,
             flips,
             straightened: sides.flips,
+            bent,
             glued,
             missing,
             max_error: if is_finite { largest } else { f64::INFINITY },
