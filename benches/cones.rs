@@ -101,6 +101,7 @@ fn measure(
                 &Default::default(),
                 params,
                 &BoundaryParams::default(),
+                &Default::default(),
             )
         });
         choice.least(seconds);
