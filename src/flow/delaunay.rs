@@ -31,9 +31,10 @@ const SLACK: f64 = 1e-12;
 const LENGTH_ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// The slack never exceeds this, however thin a face is.
 const MOST_SLACK: f64 = 1e-9;
-/// Factor on the slack for every time that the edge was flipped already at this `u`: rounding may make both
-/// diagonals of a nearly cocircular quad look wrong, and this ends the quarrel.
+/// Factor on the slack for every so many times that the edge was flipped already at this `u`: rounding may make both
+/// diagonals of a nearly cocircular quad look wrong, and this ends the quarrel. In a fan of a thousand faces an edge is rightly flipped a hundred times.
 const SLACK_GROWTH: f64 = 4.0;
+const PATIENCE: u16 = 64;
 /// Below this many items a piece is not worth another thread.
 const PIECE: usize = 4096;
 
@@ -55,7 +56,7 @@ pub struct Delaunay {
     /// Flips so far.
     pub flips: usize,
     /// How often every edge was flipped at this `u`; all zero between evaluations.
-    tired: EdgeVec<u8>,
+    tired: EdgeVec<u16>,
     /// Edges that stay, Delaunay or not; `None` where none need do.
     held: Option<EdgeVec<bool>>,
 }
@@ -294,7 +295,7 @@ impl Delaunay {
         if f == g {
             return false;
         }
-        let slack = SLACK * SLACK_GROWTH.powi(i32::from(self.tired[e]));
+        let slack = SLACK * SLACK_GROWTH.powi(i32::from(self.tired[e] / PATIENCE));
         if shape[f].broken || shape[g].broken {
             let cosine = |h: HalfedgeId| {
                 let sides = self.log_sides(u, c.face(h));

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Names of configurations with their settings. All but the first leave out pictures and pages, which tell nothing of an atlas.
-const CONFIGURATIONS: [(&str, &[&str]); 19] = [
+const CONFIGURATIONS: [(&str, &[&str]); 20] = [
     ("defaults", &[]),
     ("plain", PLAIN),
     ("rectangle", &["images.domain=rectangle"]),
@@ -37,6 +37,10 @@ const CONFIGURATIONS: [(&str, &[&str]); 19] = [
     ("single", &["cones.strategy=single"]),
     ("spread", &["cones.strategy=spread"]),
     ("quantum", &["cones.quantum=\"1/2\""]),
+    (
+        "field",
+        &["cones.strategy=field", "flow.holonomy=quarter-turns"],
+    ),
     (
         "packed",
         &["patches.packed_side=128", "patches.max_count=4"],

@@ -27,7 +27,7 @@ use crate::flow::seamless::{
 };
 use crate::flow::signature::{FULL_TURN, Signature};
 use crate::flow::step::FlowStep;
-use crate::flow::straighten::straighten;
+use crate::flow::straighten::{StraightenError, straighten};
 use crate::flow::surface_delaunay::SurfaceDelaunay;
 use crate::flow::vertex_scale::nearest_scale;
 use crate::geometry::connectivity::Connectivity;
@@ -282,8 +282,8 @@ pub(crate) fn with_lengths(
     let conformal_error = conformal_error(&ground.delaunay, &change, &u);
     let delaunay_penner = at_unit_scale(&ground.delaunay, &log_length, &u);
     let (mut flat, mut shape) = flipped(&ground, log_length);
-    if !lines.is_empty() {
-        straighten(&mut flat, &ground.base, lines)?;
+    if !surface.is_closed() {
+        straighten_mirror(&mut flat, &ground.base, surface, lines)?;
         let still = VertexVec::filled(0.0, ground.base.vertex_count());
         flat.update_shapes(&still, &mut shape);
     }
@@ -320,6 +320,25 @@ pub(crate) fn with_lengths(
             Some(delaunay_penner),
         ))),
     })
+}
+
+/// Makes the mirror an edge of the flat triangulation everywhere, so that nothing crosses it; where faces without width do not allow that, `lines` alone.
+fn straighten_mirror(
+    flat: &mut Delaunay,
+    base: &Connectivity,
+    surface: &Connectivity,
+    lines: &[EdgeId],
+) -> Result<(), StraightenError> {
+    let border = surface.halfedges().filter(|&h| surface.twin(h).is_none());
+    let mirror: Vec<EdgeId> = border.map(|h| base.edge(h)).collect();
+    let mut whole = flat.clone();
+    match straighten(&mut whole, base, &mirror) {
+        Ok(_) => *flat = whole,
+        Err(_) => {
+            straighten(flat, base, lines)?;
+        }
+    }
+    Ok(())
 }
 
 /// Root of the mean square and maximum of λ* − λ⁰ − (u_i + u_j) over all edges; `change`: of half the λ.

@@ -62,6 +62,16 @@ pub enum SeamlessError {
         /// How many.
         faces: usize,
     },
+    /// The Jacobian is far from sparse.
+    #[error(
+        "on this mesh the angles depend on lengths that are far away, by {products} products in the linear system (most: {most}), since very many long thin faces lie side by side: divide the long faces, or remesh the surface with faces of similar sides"
+    )]
+    TooDense {
+        /// Products of entries.
+        products: usize,
+        /// How many there may be.
+        most: usize,
+    },
     /// The side of a feature is no straight line where Newton begins.
     #[error(
         "edge {edge} cannot be made a straight line, since faces beside it have no width in float64's 16 digits: remove them from the mesh, or ask for fewer features (features.angle)"

@@ -3,14 +3,20 @@
 //! *Enters:* a [`State`]. *Leaves:* a factor of A M⁻¹ Aᵀ and directions. The cone angles of two vertices are coupled where some edge moves both, about 19 entries a row; a
 //! loop is coupled with all vertices near it. So the loops come last in the elimination: rows that are long but few do not fill the rest.
 
+use super::SeamlessError;
 use super::jacobian::Columns;
 use super::norm::Norm;
 use super::state::{Problem, State};
-use crate::flow::solve::{SolveError, SymmetricSolver};
+use crate::flow::solve::SymmetricSolver;
 use crate::geometry::ids::{EdgeId, EdgeVec, VertexId};
 
 /// Shifts of the diagonal, relative to its mean, tried in turn until the matrix is positive definite.
 const SHIFTS: [f64; 4] = [1e-14, 1e-12, 1e-10, 1e-8];
+
+/// Most products of entries of the Jacobian for each edge; ordinary meshes have about ten.
+const MOST_PRODUCTS_OF_EDGE: usize = 60;
+/// So many are allowed whatever the number of edges: less than half a gigabyte.
+const ALLOWED_PRODUCTS: usize = 20_000_000;
 
 /// The system at one λ.
 pub(super) struct Normal {
@@ -40,11 +46,12 @@ impl Normal {
         state: &State,
         norm: &Norm,
         last: Option<Self>,
-    ) -> Result<Self, SolveError> {
+    ) -> Result<Self, SeamlessError> {
         let equations = problem.equations();
         let by_edges = state.by_edges(problem);
         let by_scales = norm.vertex.as_ref();
         let by_scales = by_scales.map(|_| state.by_scales(problem, &by_edges));
+        check_density(&by_edges, problem.base.edge_count())?;
         let mut products = Products::new(problem.local_equations(), equations);
         products.add(&by_edges, norm.edge.as_slice());
         if let (Some(columns), Some(weight)) = (&by_scales, &norm.vertex) {
@@ -113,6 +120,17 @@ impl Normal {
         let change = self.by_edges.times(&direction, missing.len());
         let direction = problem.shares.iter().map(|&e| direction[e]).collect();
         (direction, change)
+    }
+}
+
+/// Refuses what would take hours and all of the memory: an edge that was flipped hundreds of times over moves the angles of as many vertices.
+fn check_density(by_edges: &Columns, edges: usize) -> Result<(), SeamlessError> {
+    let rows = (0..by_edges.count()).map(|c| by_edges.column(c).0.len());
+    let products: usize = rows.map(|n| n * n / 2).sum();
+    let most = (MOST_PRODUCTS_OF_EDGE * edges).max(ALLOWED_PRODUCTS);
+    match products > most {
+        true => Err(SeamlessError::TooDense { products, most }),
+        false => Ok(()),
     }
 }
 
