@@ -55,44 +55,58 @@ pub fn straighten(
     base: &Connectivity,
     lines: &[EdgeId],
 ) -> Result<Straightened, StraightenError> {
-    let mut done = Straightened::default();
-    let runs: Vec<HalfedgeId> = lines.iter().map(|&e| base.edge_halfedge(e)).collect();
-    let Some(integers) = flat.correspondences.first() else {
-        return Ok(done);
-    };
-    let c = &flat.connectivity;
-    let curves = integers.follow(base, c, &runs)?;
-    let along = |h: Option<HalfedgeId>| h.map(|h| c.edge(h));
-    let curves: Vec<_> = (curves.into_iter())
-        .map(|(h, crossing)| (along(h), crossing))
-        .collect();
-    // Faces that flips have changed: what was said of lines through them is out of date.
-    let mut is_changed = FaceVec::filled(false, c.face_count());
-    for ((&line, run), (along, mut crossing)) in lines.iter().zip(runs).zip(curves) {
-        let before = done.flips.len();
-        let edge = match along {
-            Some(edge) => Some(edge),
-            None => {
-                let c = &flat.connectivity;
-                let mut faces = crossing.iter().flat_map(|x| faces_beside(c, x.halfedge));
-                if faces.any(|f| is_changed[f]) {
-                    let again = flat.correspondences[0].follow(base, c, &[run])?;
-                    crossing = again.into_iter().flat_map(|(_, x)| x).collect();
-                }
-                let strip = Strip::new(flat, &crossing);
-                strip.and_then(|mut strip| strip.clear(flat, &mut done.flips))
-            }
+    let mut flips = Vec::new();
+    let mut edge: Vec<Option<EdgeId>> = vec![None; lines.len()];
+    let mut left: Vec<usize> = (0..lines.len()).collect();
+    while let Some(&first) = left.first() {
+        let c = &flat.connectivity;
+        let runs: Vec<HalfedgeId> = (left.iter())
+            .map(|&i| base.edge_halfedge(lines[i]))
+            .collect();
+        let Some(integers) = flat.correspondences.first() else {
+            break;
         };
-        for flip in &done.flips[before..] {
-            let changed = faces_beside(&flat.connectivity, flip.flip.h);
-            changed.into_iter().for_each(|f| is_changed[f] = true);
+        let curves = integers.follow(base, c, &runs)?;
+        // What was said of lines through faces that flips have changed is out of date: they are for the next round.
+        let mut is_changed = FaceVec::filled(false, c.face_count());
+        let mut later = Vec::new();
+        // Flips move halfedges, not edges.
+        let along = |h: Option<HalfedgeId>| h.map(|h| c.edge(h));
+        let curves: Vec<_> = (curves.into_iter())
+            .map(|(h, crossing)| (along(h), crossing))
+            .collect();
+        for (&i, (along, crossing)) in left.iter().zip(&curves) {
+            if along.is_some() {
+                edge[i] = *along;
+                continue;
+            }
+            let c = &flat.connectivity;
+            let mut faces = crossing.iter().flat_map(|x| faces_beside(c, x.halfedge));
+            if faces.any(|f| is_changed[f]) {
+                later.push(i);
+                continue;
+            }
+            let before = flips.len();
+            let strip = Strip::new(flat, crossing);
+            edge[i] = strip.and_then(|mut strip| strip.clear(flat, &mut flips));
+            for flip in &flips[before..] {
+                let changed = faces_beside(&flat.connectivity, flip.flip.h);
+                changed.into_iter().for_each(|f| is_changed[f] = true);
+            }
+            let is_edge = |e: &EdgeId| flat.correspondences[0].is_base_edge(*e);
+            if edge[i].filter(is_edge).is_none() {
+                return Err(StraightenError::Bent { edge: lines[i] });
+            }
         }
-        let is_edge = |e: &EdgeId| flat.correspondences[0].is_base_edge(*e);
-        let edge = edge.filter(is_edge);
-        done.edge
-            .push(edge.ok_or(StraightenError::Bent { edge: line })?);
+        if later.len() == left.len() {
+            return Err(StraightenError::Bent { edge: lines[first] });
+        }
+        left = later;
     }
-    Ok(done)
+    Ok(Straightened {
+        flips,
+        edge: edge.into_iter().flatten().collect(),
+    })
 }
 
 fn faces_beside(c: &Connectivity, h: HalfedgeId) -> [FaceId; 2] {

@@ -39,7 +39,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 /// Curvatures that are multiples of π/2 up to rounding are so to this, radians.
 const ROUNDING: f64 = 1e-9;
 
-/// Most Newton steps as long as features may be given up: those that can be met are met in fewer.
+/// Most Newton steps, and as long as features may be given up: metrics that exist are met in far fewer.
+const MOST_STEPS: usize = 100;
 const STEPS_WITH_FEATURES: usize = 40;
 
 /// See the module docs.
@@ -83,7 +84,7 @@ fn with_cones(
         cone: ground.original.iter().map(doubled).collect(),
         turning: nearest_turning(&on, &log_length, &conformal),
     };
-    let max_steps = params.max_newton_steps;
+    let max_steps = params.max_newton_steps.min(MOST_STEPS);
     let found = solved(&on, &log_length, &signature, params, max_steps, observer)?;
     let log_length = found.penner.iter().map(|l| 0.5 * l).collect();
     let log_length = ground.on_delaunay(log_length);
@@ -116,7 +117,7 @@ fn along_features(
         let log_length = ground.on_symmetric(ground.log_length.clone());
         let max_steps = match held().next() {
             Some(_) => params.max_newton_steps.min(STEPS_WITH_FEATURES),
-            None => params.max_newton_steps,
+            None => params.max_newton_steps.min(MOST_STEPS),
         };
         let found = match solved(&on, &log_length, &signature, params, max_steps, observer) {
             Err(SeamlessError::NoLine { edge }) => {

@@ -15,6 +15,9 @@ use crate::observe::Observer;
 
 /// Largest range of a step in λ: beyond it the linear model means nothing.
 const LARGEST_RANGE: f64 = 2.5;
+/// Where there are features, so many steps one after another that are shorter than this are the end: with fewer features longer ones are possible.
+const SHORT_STEPS: usize = 3;
+const SHORT: f64 = 0.02;
 /// The line search gives up below this step.
 const SMALLEST_STEP: f64 = 1e-8;
 /// Part of the square of what is missing that a step may leave and is taken whatever lies beyond.
@@ -59,6 +62,7 @@ pub(super) fn solve(
     let mut record = SeamlessStep::default();
     let mut history = vec![record.at(&state)];
     let mut last: Option<Normal> = None;
+    let mut short = 0;
     let stalled = |iterations: usize, state: &State, step: f64| SeamlessError::Stalled {
         iterations,
         max_error: state.max_error,
@@ -83,6 +87,10 @@ pub(super) fn solve(
         (penner, state) = (next, found);
         record.iteration += 1;
         record.step = step;
+        short = if step < SHORT { short + 1 } else { 0 };
+        if short >= SHORT_STEPS && !state.glued.is_empty() {
+            return Err(stalled(record.iteration, &state, step));
+        }
         if reuse == Reuse::WhereFast && is_fast {
             let goal = params.tolerance;
             refine(
