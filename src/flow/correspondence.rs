@@ -14,6 +14,8 @@
 
 mod trace;
 
+pub use trace::Followed;
+
 use crate::geometry::connectivity::{Connectivity, Flip};
 use crate::geometry::ids::{EdgeId, EdgeVec, HalfedgeId, HalfedgeVec, VertexVec};
 

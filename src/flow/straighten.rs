@@ -7,7 +7,7 @@
 //! The faces that a line crosses are laid out in the plane, where they make a polygon with the line as a diagonal. An edge across the line is flipped where the quad around it is
 //! convex, until none is left (Sloan 1993).
 
-use super::correspondence::{CorrespondenceError, Crossing};
+use super::correspondence::{CorrespondenceError, Crossing, Followed};
 use super::delaunay::Delaunay;
 use crate::geometry::connectivity::{Connectivity, Flip};
 use crate::geometry::ids::{EdgeId, FaceId, FaceVec, HalfedgeId};
@@ -71,13 +71,11 @@ pub fn straighten(
         let mut is_changed = FaceVec::filled(false, c.face_count());
         let mut later = Vec::new();
         // Flips move halfedges, not edges.
-        let along = |h: Option<HalfedgeId>| h.map(|h| c.edge(h));
-        let curves: Vec<_> = (curves.into_iter())
-            .map(|(h, crossing)| (along(h), crossing))
-            .collect();
-        for (&i, (along, crossing)) in left.iter().zip(&curves) {
+        let along = |curve: &Followed| curve.along.map(|h| c.edge(h));
+        let along: Vec<Option<EdgeId>> = curves.iter().map(along).collect();
+        for ((&i, along), Followed { crossing, .. }) in left.iter().zip(along).zip(&curves) {
             if along.is_some() {
-                edge[i] = *along;
+                edge[i] = along;
                 continue;
             }
             let c = &flat.connectivity;

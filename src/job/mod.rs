@@ -209,7 +209,13 @@ fn build_component(
         faces: &given_faces,
     };
     let readable = Images::new(&patches, &images, origin);
-    let (quality, rebuilt) = report::measure_images(quality, given, &readable, topology);
+    let (quality, rebuilt) = report::measure_images(
+        quality,
+        given,
+        &readable,
+        topology,
+        config.patches.texel_budget,
+    );
     let image_distance = rebuilt
         .filter(|_| config.report.enabled)
         .and_then(|rebuilt| {

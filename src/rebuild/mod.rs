@@ -89,6 +89,12 @@ impl<'a> Images<'a> {
             origin,
         }
     }
+
+    /// Number of texels of all images.
+    pub fn texels(&self) -> usize {
+        let of = |image: &PatchImage| image.width * image.height;
+        self.patches.iter().map(of).sum()
+    }
 }
 
 /// A mesh made of images.

@@ -12,14 +12,33 @@ const SAMPLING: Sampling = Sampling {
     vertices: 20_000,
 };
 
+/// Images of so many texels are measured whatever was asked for, …
+const MEASURED_TEXELS: usize = 4_500_000;
+/// … and so many times what was asked for: tens of thousands of patches have images of many more texels, and the mesh rebuilt from these fills the memory.
+const MEASURED_BUDGETS: usize = 2;
+
 /// Fills in what is measured on images, and gives the mesh rebuilt from them; `source` is the surface after repair. Nothing where
-/// the images do not make a mesh of the surface's topology, which is said as a warning: charts and transitions are as good as they are.
+/// the images do not make a mesh of the surface's topology, or have far more texels than the `budget` that was asked for, which is said as a warning: charts and transitions
+/// are as good as they are.
 pub fn measure_images(
     quality: Quality,
     source: Triangles<'_>,
     images: &Images<'_>,
     topology: Topology,
+    budget: usize,
 ) -> (Quality, Option<Rebuilt>) {
+    let (texels, most) = (
+        images.texels(),
+        MEASURED_TEXELS.max(MEASURED_BUDGETS * budget),
+    );
+    if texels > most {
+        tracing::warn!(
+            texels,
+            most,
+            "the images were not measured: they have too many texels"
+        );
+        return (quality, None);
+    }
     let rebuilt = rebuild(images).and_then(|mesh| {
         let Topology {
             euler_characteristic,

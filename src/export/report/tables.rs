@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 const LISTED: usize = 200;
 
 /// Figures: where in `atlas.json`, what they are, and their unit.
-const FIGURES: [(&str, &str, &str); 26] = [
+const FIGURES: [(&str, &str, &str); 27] = [
     ("/topology/vertices", "Vertices", ""),
     ("/topology/edges", "Edges", ""),
     ("/topology/faces", "Faces", ""),
@@ -40,6 +40,11 @@ const FIGURES: [(&str, &str, &str); 26] = [
     ),
     ("/quality/angle_error/mean", "Mean angle error", "rad"),
     ("/quality/angle_error/max", "Largest angle error", "rad"),
+    (
+        "/quality/conformal_error/rms",
+        "Distance from a conformal map (rms of ln of squared lengths)",
+        "",
+    ),
     ("/quality/cut_length", "Length of the cut", "source units"),
     (
         "/quality/layout_closing_error",

@@ -10,6 +10,15 @@ use crate::geometry::ids::{EdgeVec, HalfedgeId, HalfedgeVec, VertexVec};
 
 use CorrespondenceError::Inconsistent;
 
+/// One base halfedge as a curve on the current triangulation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Followed {
+    /// The current halfedge that it is, if it is one.
+    pub along: Option<HalfedgeId>,
+    /// What it crosses, in order.
+    pub crossing: Vec<Crossing>,
+}
+
 /// How a base halfedge sets out from its tail.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Departure {
@@ -53,13 +62,13 @@ impl Correspondence {
         })
     }
 
-    /// Some base halfedges alone: for each the current halfedge that it is, if it is one, and its crossings.
+    /// Some base halfedges alone.
     pub fn follow(
         &self,
         base: &Connectivity,
         current: &Connectivity,
         runs: &[HalfedgeId],
-    ) -> Result<Vec<(Option<HalfedgeId>, Vec<Crossing>)>, CorrespondenceError> {
+    ) -> Result<Vec<Followed>, CorrespondenceError> {
         let count = self.crossings()?;
         let total =
             u32::try_from(count).map_err(|_| CorrespondenceError::TooManyCrossings { count });
@@ -68,7 +77,7 @@ impl Correspondence {
         let follow = |&b: &HalfedgeId| {
             let mut crossing = Vec::new();
             let along = tracer.follow(b, total, &mut crossing)?;
-            Ok((along, crossing))
+            Ok(Followed { along, crossing })
         };
         runs.iter().map(follow).collect()
     }

@@ -8,6 +8,7 @@
 
 mod distortion;
 mod failure;
+mod turns;
 
 use super::flatten::{Flattened, flatten};
 use super::listing::counted;
@@ -111,9 +112,10 @@ pub fn mesh(path: &Path, config: &Config) -> Result<Explanation, BuildError> {
             }
         };
         match flat(component, &requests, config) {
-            Ok(flat) => {
+            Ok((flat, turns)) => {
                 let (lines, surface) = flat.explain(name);
                 explanation.say(indent, lines);
+                explanation.say(indent, turns);
                 explanation.surfaces.push(surface);
             }
             Err(error) => explanation.refuse(indent, name, &error, soup),
@@ -122,8 +124,12 @@ pub fn mesh(path: &Path, config: &Config) -> Result<Explanation, BuildError> {
     Ok(explanation)
 }
 
-/// Everything up to the flat metric.
-fn flat(component: Component, requests: &Requests, config: &Config) -> Result<Flat, BuildError> {
+/// Everything up to the flat metric, and what is said of its quarter turns.
+fn flat(
+    component: Component,
+    requests: &Requests,
+    config: &Config,
+) -> Result<(Flat, Vec<String>), BuildError> {
     let frame = component.frame;
     let mesh = component.mesh?;
     let prescription = cones::prescribe(
@@ -139,7 +145,9 @@ fn flat(component: Component, requests: &Requests, config: &Config) -> Result<Fl
         prescription,
         ..
     } = flatten(mesh, prescription, config, &(), &|_| Ok(()))?;
-    Ok(Flat::of(&mesh, &metric, &prescription, &frame))
+    let turns = metric.quarter_turns.as_ref();
+    let turns = turns.map_or_else(Vec::new, |met| turns::describe(met, &mesh));
+    Ok((Flat::of(&mesh, &metric, &prescription, &frame), turns))
 }
 
 /// Explains what a build wrote: where the atlas is distorted.

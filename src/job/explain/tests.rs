@@ -110,3 +110,15 @@ fn an_asset_that_is_only_recorded_is_told_by_its_record() {
     let failure = asset(&root.path().join("unknown"), &Config::default()).unwrap_err();
     assert!(failure.message.contains("neither a mesh nor a folder"));
 }
+
+#[test]
+fn loops_and_features_of_a_seamless_metric_are_told() {
+    let said = explained("good/genus-3-pretzel.obj", |config| {
+        config.cones.strategy = crate::flow::cones::ConeStrategy::Field;
+        config.flow.holonomy = crate::flow::ricci::Holonomy::QuarterTurns;
+    });
+    let text = said.to_string();
+    assert!(!said.failed(), "{text}");
+    assert!(text.contains("6 independent loops turn by"), "{text}");
+    assert!(text.contains("nearest conformal map"), "{text}");
+}
