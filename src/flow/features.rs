@@ -14,9 +14,6 @@ pub const LEAST_EDGES: usize = 5;
 /// Sine of the angle at a corner below which a face has no direction.
 const FLAT: f64 = 1e-6;
 
-/// Cosine of the angle between two edges beyond which they do not belong to one chain: both sides of a face where a crease fades.
-const HAIRPIN: f64 = 0.5;
-
 /// Which edges shall become lines; for cones of a cross field and quarter turns only.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -132,13 +129,7 @@ fn chains(mesh: &Mesh, sharp: &EdgeVec<bool>) -> Vec<Vec<VertexId>> {
         let [a, b] = c.edge_vertices(e);
         if a == v { b } else { a }
     };
-    let is_hairpin = |v: VertexId| {
-        let ways: Vec<_> = neighbours(v).map(|e| other(e, v)).collect();
-        let [a, b] = ways[..] else { return false };
-        let [p, q] = [a, b].map(|w| sub(mesh.positions[w], mesh.positions[v]));
-        dot(p, q) > HAIRPIN * (dot(p, p) * dot(q, q)).sqrt()
-    };
-    let is_end = |v: VertexId| degree[v] != 2 || c.is_boundary_vertex(v) || is_hairpin(v);
+    let is_end = |v: VertexId| degree[v] != 2 || c.is_boundary_vertex(v);
     let mut chains = Vec::new();
     let mut walk = |start: VertexId, is_walked: &mut EdgeVec<bool>| {
         while let Some(first) = neighbours(start).find(|&e| !is_walked[e]) {

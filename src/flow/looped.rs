@@ -52,6 +52,16 @@ impl<'a> LoopedSurface<'a> {
                 glued: Vec::new(),
             });
         };
+        if surface.is_closed() {
+            return Ok(Self {
+                connectivity: &symmetric.connectivity,
+                length: symmetric.log_length.iter().map(|l| l.exp()).collect(),
+                half: None,
+                loops: homology_basis(&symmetric.connectivity)?,
+                sector: None,
+                glued: Vec::new(),
+            });
+        }
         let double = &symmetric.connectivity;
         let (faces, vertices) = (surface.face_count(), surface.vertex_count());
         let half = front(double, faces, vertices)?;

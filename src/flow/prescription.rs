@@ -54,6 +54,8 @@ pub struct Prescription {
 pub struct FromField {
     /// Chains of edges that shall become lines, the most important first; some may be given up.
     pub features: Vec<Feature>,
+    /// Features that leave no room for the corners of a field.
+    pub crowded: Vec<Feature>,
     /// Both sides of the edges of every feature, as halfedges of the own part of the [`LoopedSurface`](crate::flow::looped::LoopedSurface) that is cut open along all of them.
     pub sides: Vec<Vec<[HalfedgeId; 2]>>,
     /// The field on that part.

@@ -6,6 +6,7 @@
 
 use crate::flow::holonomy::DualLoops;
 use crate::geometry::connectivity::Connectivity;
+use crate::geometry::disjoint_sets::UnionFind;
 use crate::geometry::ids::{VertexId, VertexVec};
 
 /// Quarter turns of an angle of 2π.
@@ -115,6 +116,13 @@ impl Signature {
                 prescribed,
                 required,
             });
+        }
+        // What follows is said of one surface; several pieces have been cut apart along features.
+        let mut joined = UnionFind::new(connectivity.vertex_count());
+        let ends = connectivity.edges().map(|e| connectivity.edge_vertices(e));
+        let joins = ends.filter(|[a, b]| joined.join(a.index(), b.index()));
+        if joins.count() + 1 < connectivity.vertex_count() {
+            return Ok(());
         }
         // On a double some loops are not listed.
         let are_all = loops.len() as i64 == 2 * topology.genus;

@@ -88,8 +88,9 @@ pub fn straighten(
             let strip = Strip::new(flat, crossing);
             edge[i] = strip.and_then(|mut strip| strip.clear(flat, &mut flips));
             for flip in &flips[before..] {
-                let changed = faces_beside(&flat.connectivity, flip.flip.h);
-                changed.into_iter().for_each(|f| is_changed[f] = true);
+                // Halfedges keep their faces.
+                let faces = [flip.flip.h, flip.flip.t].map(|h| flat.connectivity.face(h));
+                faces.into_iter().for_each(|f| is_changed[f] = true);
             }
             let is_edge = |e: &EdgeId| flat.correspondences[0].is_base_edge(*e);
             if edge[i].filter(is_edge).is_none() {

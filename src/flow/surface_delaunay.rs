@@ -33,7 +33,7 @@ pub struct SurfaceDelaunay {
     pub flips: usize,
     /// Edges of A on B.
     pub base_on_delaunay: Correspondence,
-    /// T, where the surface has a boundary.
+    /// T, where the surface has a boundary or features.
     pub symmetric: Option<Box<Symmetric>>,
 }
 
@@ -84,7 +84,7 @@ impl SurfaceDelaunay {
         let identity = Correspondence::identity(&base);
         let mut delaunay = Delaunay::new(base.clone(), &base_length, vec![identity]);
         let mut symmetric = None;
-        if !opened.is_closed() {
+        if !opened.is_closed() || !features.is_empty() {
             flip_both(&mut delaunay, surface, source_length, features);
             symmetric = Some(Box::new(Symmetric {
                 connectivity: delaunay.connectivity.clone(),
@@ -165,6 +165,7 @@ fn flip_both(
     features: &[EdgeId],
 ) {
     let double = both.connectivity.clone();
+    let is_double = double.halfedge_count() > surface.halfedge_count();
     let mut held = EdgeVec::filled(false, surface.edge_count());
     features.iter().for_each(|&e| held[e] = true);
     let mut alone = Delaunay::new(surface.clone(), source_length, Vec::new()).holding(held);
@@ -172,7 +173,11 @@ fn flip_both(
     alone.flip_in_the_surface();
     let log_length = alone.log_lengths();
     for flip in alone.record.iter().flatten() {
-        for e in copies(surface, &double, surface.halfedge_count(), flip.edge) {
+        let copies = match is_double {
+            true => copies(surface, &double, surface.halfedge_count(), flip.edge),
+            false => [double.edge(surface.edge_halfedge(flip.edge)); 2],
+        };
+        for &e in &copies[..1 + usize::from(is_double)] {
             both.flip_to(e, log_length[flip.edge]);
         }
     }

@@ -47,7 +47,11 @@ pub(super) fn check(
         let along = sub2(ends[1], ends[0]);
         let direction = along[1].atan2(along[0]);
         let first = *axis.get_or_insert(direction);
-        let rounding = FLOOR * slit.diameter / distance2(ends[0], ends[1]);
+        let length = distance2(ends[0], ends[1]);
+        let rounding = match length > 0.0 {
+            true => (FLOOR * slit.diameter / length).min(TOLERANCE),
+            false => f64::NAN,
+        };
         worst.see((off_multiple(direction - first, FRAC_PI_2) - 4.0 * rounding).max(0.0));
         count += 1;
     }

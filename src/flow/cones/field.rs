@@ -22,23 +22,28 @@ use std::f64::consts::FRAC_PI_2;
 /// Least angle of a cone, quarter turns: around a vertex of two quads these would share two edges.
 const LEAST_QUARTERS: i64 = 3;
 
+/// Part of the features, the least important ones, that are left out at a time where they are too many.
+const GIVEN_UP: usize = 8;
+
 /// Cones, inside and on the border, and what else the field says.
 pub(super) fn select(
     mesh: &Mesh,
     params: &FeatureParams,
 ) -> Result<(Vec<RequestedCone>, FromField), ConeError> {
     let mut kept = features(mesh, params);
+    let mut crowded = Vec::new();
     loop {
         match along(mesh, &kept) {
             // A piece between features that is too small for its corners: with fewer features it is larger.
             Err(ConeError::Field(FieldError::TooFewVertices { .. })) if !kept.is_empty() => {
-                kept.pop();
+                crowded.extend(kept.split_off(kept.len() - kept.len().div_ceil(GIVEN_UP)));
             }
             // Faces without width that nothing but a flip across a feature takes away.
-            Err(ConeError::FieldOnFlatFaces) if !kept.is_empty() => kept.clear(),
+            Err(ConeError::FieldOnFlatFaces) if !kept.is_empty() => crowded.append(&mut kept),
             result => {
                 let (cones, mut found) = result?;
                 found.features = kept;
+                found.crowded = crowded;
                 return Ok((cones, found));
             }
         }
@@ -99,6 +104,7 @@ fn along(mesh: &Mesh, features: &[Feature]) -> Result<(Vec<RequestedCone>, FromF
     let found = FromField {
         sides: features.iter().map(sides_of).collect(),
         features: Vec::new(),
+        crowded: Vec::new(),
         field,
         signature,
         adjusted,

@@ -119,37 +119,65 @@ fn along_features(
             Some(_) => params.max_newton_steps.min(STEPS_WITH_FEATURES),
             None => params.max_newton_steps.min(MOST_STEPS),
         };
+        // The feature of every pair of sides.
+        let features = from
+            .features
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| is_held[*i]);
+        let owner = features.flat_map(|(i, f)| f.edges.iter().map(move |_| i));
+        let (owner, glued): (Vec<usize>, _) = (owner.collect(), on.glued.concat());
         let found = match solved(&on, &log_length, &signature, params, max_steps, observer) {
-            Err(SeamlessError::NoLine { edge }) => {
-                let ends = on.connectivity.edge_vertices(edge);
-                let ends = ends.map(|sector| opened.vertex[sector]);
-                let has_it = |f: &Feature| ends.iter().all(|v| f.vertices.contains(v));
-                let which = from.features.iter().zip(&is_held);
-                let which = which.into_iter().rposition(|(f, held)| *held && has_it(f));
-                let which = which.ok_or(SeamlessError::NoLine { edge })?;
-                is_held[which] = false;
-                continue;
+            Ok(found) => {
+                let log_length = found.penner.iter().map(|l| 0.5 * l).collect();
+                let log_length = ground.on_delaunay(log_length);
+                with_lengths(&opened.connectivity, ground, log_length, &glued)
+                    .map(|metric| (metric, found))
             }
-            Err(SeamlessError::Stalled { missing, .. }) if held().next().is_some() => {
-                let which = hardest(&from.features, &is_held, &opened, &missing);
-                is_held[which] = false;
-                continue;
-            }
-            found => found?,
+            Err(error) => Err(error.into()),
         };
-        let glued = on.glued.concat();
-        let lines: Vec<Feature> = held().cloned().collect();
+        let (mut metric, found) = match found {
+            Ok(found) => found,
+            Err(error) => {
+                let Some(least) = is_held.iter().rposition(|held| *held) else {
+                    return Err(error);
+                };
+                let of_side = |edge: EdgeId| {
+                    let side = glued.iter().position(|&e| e == edge)?;
+                    owner.get(side / 2).copied()
+                };
+                let which = match &error {
+                    FlowError::Seamless(SeamlessError::Stalled { missing, .. }) => {
+                        hardest(&from.features, &is_held, &opened, missing)
+                    }
+                    FlowError::Seamless(SeamlessError::NoLine { edge })
+                    | FlowError::Lines(StraightenError::Bent { edge }) => {
+                        of_side(*edge).unwrap_or(least)
+                    }
+                    FlowError::Lines(StraightenError::Correspondence(_))
+                    | FlowError::Seamless(
+                        SeamlessError::BrokenFaces { .. }
+                        | SeamlessError::TooDense { .. }
+                        | SeamlessError::Infeasible(_)
+                        | SeamlessError::Solve(_),
+                    ) => least,
+                    _ => return Err(error),
+                };
+                is_held[which] = false;
+                continue;
+            }
+        };
         let (features, is_held) = (from.features.iter(), is_held.iter());
-        let given_up = features.zip(is_held).filter(|(_, held)| !**held);
+        let (lines, others): (Vec<_>, Vec<_>) = features.zip(is_held).partition(|(_, held)| **held);
+        let cloned = |features: Vec<(&Feature, &bool)>| -> Vec<Feature> {
+            features.into_iter().map(|(f, _)| f.clone()).collect()
+        };
         let met = QuarterTurns {
             adjusted: from.adjusted,
-            given_up: given_up.map(|(f, _)| f.clone()).collect(),
-            lines,
+            lines: cloned(lines),
+            given_up: [cloned(others), from.crowded.clone()].concat(),
             ..QuarterTurns::default()
         };
-        let log_length = found.penner.iter().map(|l| 0.5 * l).collect();
-        let log_length = ground.on_delaunay(log_length);
-        let mut metric = with_lengths(&opened.connectivity, ground, log_length, &glued)?;
         if !met.lines.is_empty() {
             metric.log_scale = joined_scale(&metric.log_scale, &opened, c.vertex_count());
             metric.curvature = joined_curvature(&metric.curvature, &opened, c);

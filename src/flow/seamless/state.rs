@@ -135,12 +135,13 @@ impl<'a> Problem<'a> {
     /// The edges that the sides of features have become; flips that keep the metric where they are none. Or a side that cannot be made an edge.
     fn sides(&self, delaunay: &mut Delaunay) -> Result<Straightened, EdgeId> {
         let sides = self.glued.as_flattened();
-        let Some(&first) = sides.first() else {
+        // Of the least important feature, if it cannot be told.
+        let Some(&last) = sides.last() else {
             return Ok(Straightened::default());
         };
         straighten(delaunay, self.base, sides).map_err(|error| match error {
             StraightenError::Bent { edge } => edge,
-            StraightenError::Correspondence(_) => first,
+            StraightenError::Correspondence(_) => last,
         })
     }
 

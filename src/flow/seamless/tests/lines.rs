@@ -188,3 +188,64 @@ fn the_jacobian_with_features_agrees_with_finite_differences() {
     }
     assert!(straightened > 10, "{straightened} flips");
 }
+
+/// Features that are given up are glued again: the field stays what it is, on the same triangulation, whether they are Delaunay there or not.
+#[test]
+fn a_field_stays_where_features_are_glued_again() {
+    let shape = shapes::plate(2, 3);
+    let (c, length) = (&shape.connectivity, &shape.length);
+    let mut delaunay = Delaunay::new(c.clone(), length, Vec::new());
+    delaunay.record = Some(Vec::new());
+    delaunay.flip_in_the_surface();
+    let flips = delaunay.record.take().unwrap();
+    let mut edges: Vec<EdgeId> = flips.iter().map(|f| f.edge).collect();
+    edges.sort_unstable();
+    edges.dedup();
+    edges.truncate(3);
+    assert!(!edges.is_empty(), "every edge is Delaunay");
+    let cut = Cut::new(shape, &edges);
+    let on = cut.looped();
+    let (own, own_length) = (on.own(), on.own_length());
+    let sides = |f: FaceId| face_lengths(own, &own_length, f);
+    let angle: FaceVec<[f64; 3]> = own
+        .faces()
+        .map(|f| triangle::angles(sides(f)).unwrap())
+        .collect();
+    let area = own.faces().map(|f| triangle::area(sides(f)).unwrap());
+    let mut field = cross_field(own, &angle, &area.collect()).unwrap();
+    let (apart, _) = field.grid_signature(&on, &angle, 3).unwrap();
+    let own_side = |e: EdgeId| {
+        let h = on.connectivity.edge_halfedge(e);
+        let ways = [h, on.connectivity.twin(h).unwrap()];
+        let is_own = |h: &HalfedgeId| h.index() < own.halfedge_count();
+        ways.into_iter().find(is_own).unwrap()
+    };
+    let glued: Vec<[HalfedgeId; 2]> = on.glued.iter().map(|pair| pair.map(own_side)).collect();
+    let (c, length) = (&cut.shape.connectivity, &cut.shape.length);
+    let whole = Opened::new(c, &[]).unwrap();
+    let ground = SurfaceDelaunay::along_features(c, length, &whole, &edges).unwrap();
+    assert!(!ground.symmetric.as_ref().unwrap().flips.is_empty());
+    let closed = LoopedSurface::along_features(&whole, &ground).unwrap();
+    let signature = field.glued(&glued).signature(&closed, &angle).unwrap();
+    // Each vertex has what its sectors had; on the mirror these are there twice.
+    let mut quarters = VertexVec::filled(0, c.vertex_count());
+    for (sector, &v) in cut.opened.vertex.enumerate() {
+        let halves = match cut.opened.connectivity.is_boundary_vertex(sector) {
+            true => 2,
+            false => 1,
+        };
+        quarters[v] += apart.cone[sector] / halves;
+    }
+    assert_eq!(signature.cone, quarters);
+    let log_length = ground.on_symmetric(ground.log_length.clone());
+    let start = Start {
+        connectivity: closed.connectivity,
+        length: &closed.length,
+        log_length: Some(&log_length),
+        reflection: None,
+        glued: &closed.glued,
+    };
+    let params = SeamlessParams::default();
+    let found = seamless(&start, &closed.loops, &signature, &params, &()).unwrap();
+    assert!(found.max_error <= 1e-10);
+}
