@@ -130,8 +130,6 @@ struct Strip {
     faces: Vec<[usize; 3]>,
     /// ln of the unit of the plane.
     log_unit: f64,
-    /// The last corner; the first one is 0.
-    end: usize,
 }
 
 impl Strip {
@@ -146,7 +144,6 @@ impl Strip {
             crossed: VecDeque::new(),
             faces: Vec::new(),
             log_unit,
-            end: 0,
         };
         // The first face: the line begins opposite the first edge, which runs from the right of the line to the left.
         let first = crossing.first()?.halfedge;
@@ -188,7 +185,7 @@ impl Strip {
             match side {
                 Side::Left => left = at,
                 Side::Right => right = at,
-                Side::On => strip.end = at,
+                Side::On => {}
             }
         }
         Some(strip)

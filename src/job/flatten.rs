@@ -8,6 +8,7 @@ use super::BuildError;
 use crate::atlas::cut::{self, CutGraph};
 use crate::atlas::overlay::{self, Layout, Overlay};
 use crate::config::Config;
+use crate::flow::cones::{self, ConeError, Requests};
 use crate::flow::prescription::Prescription;
 use crate::flow::refine::ConnectivityRepair;
 use crate::flow::refine::{self, RefineError};
@@ -32,6 +33,21 @@ pub(super) struct Flattened {
     pub cut: CutGraph,
     /// What connectivity repair changed.
     pub connectivity_repair: ConnectivityRepair,
+}
+
+/// Target curvature of a component, as its configuration asks for it.
+pub(super) fn prescribed(
+    mesh: &Mesh,
+    requests: &Requests,
+    config: &Config,
+) -> Result<Prescription, ConeError> {
+    cones::prescribe(
+        mesh,
+        requests,
+        &config.cones,
+        &config.boundary,
+        &config.features,
+    )
 }
 
 /// Repairs connectivity, flows, refines and cuts. `enter` is told each stage's name before it begins, and may stop the job.

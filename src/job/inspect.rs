@@ -2,6 +2,7 @@
 
 mod existence;
 
+use super::flatten::prescribed;
 use super::listing::{self, counted};
 use super::{BuildError, refine_for};
 use crate::config::Config;
@@ -107,13 +108,7 @@ fn plan(
     offend: &mut impl FnMut(RegionOf),
 ) -> Result<(), BuildError> {
     let mesh = component.mesh?;
-    let prescription = cones::prescribe(
-        &mesh,
-        requests,
-        &config.cones,
-        &config.boundary,
-        &config.features,
-    )?;
+    let prescription = prescribed(&mesh, requests, config)?;
     let given = existence::decide(&mesh, &prescription, &config.flow)
         .map_err(|e| BuildError::flow(e, &mesh))?;
     if let Some(Verdict::Impossible(violation)) = &given {

@@ -22,7 +22,7 @@ pub use error::{BuildError, Unverified};
 pub use inspect::{Inspection, inspect};
 pub use precision::{Cause, Precision};
 
-use flatten::{Flattened, flatten, refine_for};
+use flatten::{Flattened, flatten, prescribed, refine_for};
 use publication::Publication;
 
 use crate::atlas::develop::Development;
@@ -135,13 +135,7 @@ fn build_component(
     enter("cones")?;
     let frame = component.frame;
     let mesh = component.mesh?;
-    let prescription = cones::prescribe(
-        &mesh,
-        requests,
-        &config.cones,
-        &config.boundary,
-        &config.features,
-    )?;
+    let prescription = prescribed(&mesh, requests, config)?;
     let (given, given_faces) = (mesh.positions.clone(), mesh.connectivity.to_faces());
     let source = SourceSurface::of(&mesh, &config.images);
     let Flattened {

@@ -13,6 +13,7 @@
 //! a fixed connectivity may have none, and then the extended energy may even reach the tolerance with broken
 //! faces: that ends in [`FlowError::NotConverged`], never in a metric.
 
+mod along_features;
 pub mod error;
 #[cfg(test)]
 mod existence;
@@ -25,6 +26,7 @@ mod params;
 mod polish;
 mod problem;
 mod quarter_turns;
+mod seamless_metric;
 #[cfg(test)]
 pub(crate) mod shapes;
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::norm::Norm;
 use super::state::Problem;
 use super::*;
 use crate::flow::delaunay::Delaunay;
-use crate::flow::field::cross_field;
+use crate::flow::field::{CrossField, cross_field};
 use crate::flow::holonomy::homology_basis;
 use crate::flow::looped::LoopedSurface;
 use crate::flow::metric::face_lengths;
@@ -29,22 +29,31 @@ struct Prepared {
     signature: Signature,
 }
 
+/// The smoothest field on the own part of a surface, with the angles there.
+fn field_of(on: &LoopedSurface) -> (CrossField, FaceVec<[f64; 3]>) {
+    let (own, length) = (on.own(), on.own_length());
+    let sides = |f: FaceId| face_lengths(own, &length, f);
+    let angle: FaceVec<[f64; 3]> = own
+        .faces()
+        .map(|f| triangle::angles(sides(f)).unwrap())
+        .collect();
+    let area = own.faces().map(|f| triangle::area(sides(f)).unwrap());
+    let field = cross_field(own, &angle, &area.collect()).unwrap();
+    (field, angle)
+}
+
+/// The signature of that field that a grid can have.
+fn signature(on: &LoopedSurface) -> Signature {
+    let (mut field, angle) = field_of(on);
+    field.grid_signature(on, &angle, 3).unwrap().0
+}
+
 fn prepare(shape: &Shape) -> Prepared {
     let mut delaunay = Delaunay::new(shape.connectivity.clone(), &shape.length, Vec::new());
     delaunay.flip_in_the_surface();
     let length: EdgeVec<f64> = delaunay.log_lengths().iter().map(|l| l.exp()).collect();
     let c = delaunay.connectivity;
-    let sides = |f: FaceId| face_lengths(&c, &length, f);
-    let angle: FaceVec<[f64; 3]> = c
-        .faces()
-        .map(|f| triangle::angles(sides(f)).unwrap())
-        .collect();
-    let area = c
-        .faces()
-        .map(|f| triangle::area(sides(f)).unwrap())
-        .collect();
     let loops = homology_basis(&c).unwrap();
-    let mut field = cross_field(&c, &angle, &area).unwrap();
     let looped = LoopedSurface {
         connectivity: &c,
         length: length.clone(),
@@ -53,7 +62,7 @@ fn prepare(shape: &Shape) -> Prepared {
         sector: None,
         glued: Vec::new(),
     };
-    let signature = field.grid_signature(&looped, &angle, 3).unwrap().0;
+    let signature = signature(&looped);
     Prepared {
         name: shape.name.clone(),
         c,

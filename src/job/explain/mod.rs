@@ -10,7 +10,7 @@ mod distortion;
 mod failure;
 mod turns;
 
-use super::flatten::{Flattened, flatten};
+use super::flatten::{Flattened, flatten, prescribed};
 use super::listing::counted;
 use super::{BuildError, Requests, cones, read, repair};
 use crate::config::Config;
@@ -132,13 +132,7 @@ fn flat(
 ) -> Result<(Flat, Vec<String>), BuildError> {
     let frame = component.frame;
     let mesh = component.mesh?;
-    let prescription = cones::prescribe(
-        &mesh,
-        requests,
-        &config.cones,
-        &config.boundary,
-        &config.features,
-    )?;
+    let prescription = prescribed(&mesh, requests, config)?;
     let Flattened {
         mesh,
         metric,

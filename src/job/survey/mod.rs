@@ -17,7 +17,7 @@ pub use figures::{Figures, Marked, Scene};
 pub use files::folder_name;
 pub use suggestion::Suggestion;
 
-use super::flatten::flatten;
+use super::flatten::{flatten, prescribed};
 use super::{BuildError, Observed};
 use crate::config::Config;
 use crate::flow::cones::{
@@ -230,13 +230,7 @@ impl Task<'_> {
         })?;
         let config = with_cones(self.config, strategy, asked);
         let requests = self.requests(&config)?;
-        let chosen = cones::prescribe(
-            mesh,
-            &requests,
-            &config.cones,
-            &config.boundary,
-            &config.features,
-        )?;
+        let chosen = prescribed(mesh, &requests, &config)?;
         let specs = self.written(mesh, &chosen.cones);
         let prescription = match &specs {
             Some(list) if !list.is_empty() => self.listed(mesh, &config, list)?,
@@ -284,13 +278,7 @@ impl Task<'_> {
         config.cones.strategy = ConeStrategy::Listed;
         config.cones.list = list.to_vec();
         let requests = self.requests(&config)?;
-        Ok(cones::prescribe(
-            mesh,
-            &requests,
-            &config.cones,
-            &config.boundary,
-            &config.features,
-        )?)
+        Ok(prescribed(mesh, &requests, &config)?)
     }
 }
 

@@ -52,18 +52,6 @@ impl Bounded {
     }
 }
 
-fn signature(on: &LoopedSurface) -> Signature {
-    let (own, length) = (on.own(), on.own_length());
-    let sides = |f: FaceId| face_lengths(own, &length, f);
-    let angle: FaceVec<[f64; 3]> = own
-        .faces()
-        .map(|f| triangle::angles(sides(f)).unwrap())
-        .collect();
-    let area = own.faces().map(|f| triangle::area(sides(f)).unwrap());
-    let mut field = cross_field(own, &angle, &area.collect()).unwrap();
-    field.grid_signature(on, &angle, 3).unwrap().0
-}
-
 #[test]
 fn borders_become_straight_and_every_loop_of_the_double_turns_by_quarters() {
     for shape in bounded() {

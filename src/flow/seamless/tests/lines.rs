@@ -96,18 +96,6 @@ fn cut() -> Vec<Cut> {
     .collect()
 }
 
-fn signature(on: &LoopedSurface) -> Signature {
-    let (own, length) = (on.own(), on.own_length());
-    let sides = |f: FaceId| face_lengths(own, &length, f);
-    let angle: FaceVec<[f64; 3]> = own
-        .faces()
-        .map(|f| triangle::angles(sides(f)).unwrap())
-        .collect();
-    let area = own.faces().map(|f| triangle::area(sides(f)).unwrap());
-    let mut field = cross_field(own, &angle, &area.collect()).unwrap();
-    field.grid_signature(on, &angle, 3).unwrap().0
-}
-
 /// Angles of all sectors are met, and both sides of every edge of a feature are edges of the metric, of one length. Each vertex has what its sectors have.
 #[test]
 fn features_become_lines_of_one_length_on_both_sides() {
@@ -205,15 +193,9 @@ fn a_field_stays_where_features_are_glued_again() {
     assert!(!edges.is_empty(), "every edge is Delaunay");
     let cut = Cut::new(shape, &edges);
     let on = cut.looped();
-    let (own, own_length) = (on.own(), on.own_length());
-    let sides = |f: FaceId| face_lengths(own, &own_length, f);
-    let angle: FaceVec<[f64; 3]> = own
-        .faces()
-        .map(|f| triangle::angles(sides(f)).unwrap())
-        .collect();
-    let area = own.faces().map(|f| triangle::area(sides(f)).unwrap());
-    let mut field = cross_field(own, &angle, &area.collect()).unwrap();
+    let (mut field, angle) = field_of(&on);
     let (apart, _) = field.grid_signature(&on, &angle, 3).unwrap();
+    let own = on.own();
     let own_side = |e: EdgeId| {
         let h = on.connectivity.edge_halfedge(e);
         let ways = [h, on.connectivity.twin(h).unwrap()];

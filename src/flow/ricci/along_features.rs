@@ -1,0 +1,185 @@
+//! Metrics with quarter turns whose cones, turnings and features are those of a cross field.
+//!
+//! *Enters:* a surface and what a field says of it. *Leaves:* a [`FlatMetric`]. *Guaranteed:* cones and turnings to the tolerance, features that are said to be lines straight and
+//! as long on one side as on the other, or an error. *Not guaranteed:* that all features are lines: a cycle of them may ask for more than any metric has. Those that are not are named.
+
+use super::error::FlowError;
+use super::flat_metric::{FlatMetric, QuarterTurns};
+use super::flipping::Surface;
+use super::params::FlowParams;
+use super::seamless_metric::{recorded, solved, with_lengths};
+use crate::flow::features::Feature;
+use crate::flow::looped::LoopedSurface;
+use crate::flow::metric::face_lengths;
+use crate::flow::opened::Opened;
+use crate::flow::prescription::FromField;
+use crate::flow::seamless::SeamlessError;
+use crate::flow::signature::Signature;
+use crate::flow::straighten::StraightenError;
+use crate::flow::surface_delaunay::SurfaceDelaunay;
+use crate::geometry::connectivity::Connectivity;
+use crate::geometry::ids::{EdgeId, VertexVec};
+use crate::geometry::triangle;
+use crate::observe::Observer;
+use std::f64::consts::{PI, TAU};
+
+/// Most Newton steps as long as features may be given up: those that can be met are met in fewer.
+const STEPS_WITH_FEATURES: usize = 40;
+
+/// Cones and turnings of a field, with as many of its features as lines as Newton's method can meet.
+pub(super) fn flow(
+    surface: Surface,
+    from: &FromField,
+    params: &FlowParams,
+    observer: &dyn Observer,
+) -> Result<FlatMetric, FlowError> {
+    let c = surface.connectivity;
+    let all = edges_of(from.features.iter());
+    let mut is_held = vec![true; from.features.len()];
+    loop {
+        let held = || {
+            let features = from.features.iter().zip(&is_held);
+            features.filter(|(_, held)| **held).map(|(f, _)| f)
+        };
+        let opened = Opened::new(c, &edges_of(held()))?;
+        let ground = SurfaceDelaunay::along_features(c, surface.source_length, &opened, &all)?;
+        let on = LoopedSurface::along_features(&opened, &ground)?;
+        let signature = match is_held.iter().all(|held| *held) {
+            true => from.signature.clone(),
+            false => without(from, &is_held, &on)?,
+        };
+        let log_length = ground.on_symmetric(ground.log_length.clone());
+        let max_steps = match held().next() {
+            Some(_) => params.max_newton_steps.min(STEPS_WITH_FEATURES),
+            None => params.max_newton_steps,
+        };
+        // The feature of every pair of sides.
+        let features = from
+            .features
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| is_held[*i]);
+        let owner = features.flat_map(|(i, f)| f.edges.iter().map(move |_| i));
+        let (owner, glued): (Vec<usize>, _) = (owner.collect(), on.glued.concat());
+        let found = match solved(&on, &log_length, &signature, params, max_steps, observer) {
+            Ok(found) => {
+                let log_length = found.penner.iter().map(|l| 0.5 * l).collect();
+                let log_length = ground.on_delaunay(log_length);
+                with_lengths(&opened.connectivity, ground, log_length, &glued)
+                    .map(|metric| (metric, found))
+            }
+            Err(error) => Err(error.into()),
+        };
+        let (mut metric, found) = match found {
+            Ok(found) => found,
+            Err(error) => {
+                let Some(least) = is_held.iter().rposition(|held| *held) else {
+                    return Err(error);
+                };
+                let of_side = |edge: EdgeId| {
+                    let side = glued.iter().position(|&e| e == edge)?;
+                    owner.get(side / 2).copied()
+                };
+                let which = match &error {
+                    FlowError::Seamless(SeamlessError::Stalled { missing, .. }) => {
+                        hardest(&from.features, &is_held, &opened, missing)
+                    }
+                    FlowError::Seamless(SeamlessError::NoLine { edge })
+                    | FlowError::Lines(StraightenError::Bent { edge }) => {
+                        of_side(*edge).unwrap_or(least)
+                    }
+                    FlowError::Lines(StraightenError::Correspondence(_))
+                    | FlowError::Seamless(
+                        SeamlessError::BrokenFaces { .. }
+                        | SeamlessError::TooDense { .. }
+                        | SeamlessError::Infeasible(_)
+                        | SeamlessError::Solve(_),
+                    ) => least,
+                    _ => return Err(error),
+                };
+                is_held[which] = false;
+                continue;
+            }
+        };
+        let (features, is_held) = (from.features.iter(), is_held.iter());
+        let (lines, others): (Vec<_>, Vec<_>) = features.zip(is_held).partition(|(_, held)| **held);
+        let cloned = |features: Vec<(&Feature, &bool)>| -> Vec<Feature> {
+            features.into_iter().map(|(f, _)| f.clone()).collect()
+        };
+        let met = QuarterTurns {
+            adjusted: from.adjusted,
+            lines: cloned(lines),
+            given_up: [cloned(others), from.crowded.clone()].concat(),
+            ..QuarterTurns::default()
+        };
+        if !met.lines.is_empty() {
+            metric.log_scale = joined_scale(&metric.log_scale, &opened, c.vertex_count());
+            metric.curvature = joined_curvature(&metric.curvature, &opened, c);
+            metric.opened = Some(Box::new(opened));
+        }
+        return Ok(recorded(metric, found, &signature, met));
+    }
+}
+
+/// The feature where most is missing; of equal ones the least important.
+fn hardest(
+    features: &[Feature],
+    is_held: &[bool],
+    opened: &Opened,
+    missing: &VertexVec<f64>,
+) -> usize {
+    let mut at = VertexVec::filled(0.0, opened.vertex.len());
+    for (sector, &v) in opened.vertex.enumerate() {
+        at[v] += missing[sector] * missing[sector];
+    }
+    let (mut worst, mut most) = (is_held.iter().rposition(|held| *held).unwrap_or(0), 0.0);
+    for (which, feature) in features.iter().enumerate().filter(|(i, _)| is_held[*i]) {
+        let sum: f64 = feature.vertices.iter().map(|&v| at[v]).sum();
+        if sum >= most && sum > 0.0 {
+            (worst, most) = (which, sum);
+        }
+    }
+    worst
+}
+
+/// The signature of a field on a surface where some features are not cut open.
+fn without(from: &FromField, is_held: &[bool], on: &LoopedSurface) -> Result<Signature, FlowError> {
+    let sides = from.sides.iter().zip(is_held);
+    let glued = sides.filter(|(_, held)| !**held).flat_map(|(s, _)| s);
+    let field = from.field.glued(&glued.copied().collect::<Vec<_>>());
+    let (own, length) = (on.own(), on.own_length());
+    let angle = own.faces().map(|f| {
+        let angles = triangle::angles(face_lengths(own, &length, f));
+        angles.unwrap_or([f64::NAN; 3])
+    });
+    Ok(field.signature(on, &angle.collect())?)
+}
+
+fn edges_of<'a>(features: impl Iterator<Item = &'a Feature>) -> Vec<EdgeId> {
+    features.flat_map(|f| &f.edges).copied().collect()
+}
+
+/// The scale of every vertex from those of its sectors: their mean.
+fn joined_scale(of_sector: &VertexVec<f64>, opened: &Opened, vertices: usize) -> VertexVec<f64> {
+    let mut sum = VertexVec::filled((0.0, 0.0), vertices);
+    for (sector, u) in of_sector.enumerate() {
+        let (total, count) = &mut sum[opened.vertex[sector]];
+        (*total, *count) = (*total + u, *count + 1.0);
+    }
+    let mean = sum.iter().map(|(total, count): &(f64, f64)| total / count);
+    mean.collect()
+}
+
+/// The curvature of every vertex from those of its sectors.
+fn joined_curvature(
+    of_sector: &VertexVec<f64>,
+    opened: &Opened,
+    surface: &Connectivity,
+) -> VertexVec<f64> {
+    let flat = |c: &Connectivity, v| if c.is_boundary_vertex(v) { PI } else { TAU };
+    let mut curvature: VertexVec<f64> = surface.vertices().map(|v| flat(surface, v)).collect();
+    for (sector, &v) in opened.vertex.enumerate() {
+        curvature[v] -= flat(&opened.connectivity, sector) - of_sector[sector];
+    }
+    curvature
+}

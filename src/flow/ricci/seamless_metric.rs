@@ -1,0 +1,187 @@
+//! From lengths found by Newton's method on all edges to a [`FlatMetric`], whatever was prescribed.
+//!
+//! *Enters:* a triangulation with loops and a signature; then lengths on B. *Leaves:* a [`SeamlessMetric`]; a [`FlatMetric`] like that of the conformal flow, with the scale that
+//! comes nearest to it. *Guaranteed:* borders and features are edges of C, so nothing crosses them, but for borders beside faces without width.
+
+use super::error::FlowError;
+use super::flat_metric::{FlatMetric, QuarterTurns};
+use super::params::FlowParams;
+use crate::flow::correspondence::Correspondence;
+use crate::flow::delaunay::Delaunay;
+use crate::flow::looped::LoopedSurface;
+use crate::flow::mirror::Reflection;
+use crate::flow::scale::at_unit_scale;
+use crate::flow::schemes::FaceShape;
+use crate::flow::seamless::{
+    SeamlessError, SeamlessMetric, SeamlessParams, SeamlessStep, Start, seamless,
+};
+use crate::flow::signature::Signature;
+use crate::flow::step::FlowStep;
+use crate::flow::straighten::{StraightenError, straighten};
+use crate::flow::surface_delaunay::SurfaceDelaunay;
+use crate::flow::vertex_scale::nearest_scale;
+use crate::geometry::connectivity::Connectivity;
+use crate::geometry::ids::{EdgeId, EdgeVec, FaceVec, VertexId, VertexVec};
+use crate::observe::Observer;
+use std::f64::consts::TAU;
+
+/// Most Newton steps: metrics that exist are met in far fewer.
+const MOST_STEPS: usize = 100;
+
+/// Newton's method, in `max_steps` steps at the most.
+pub(super) fn solved(
+    on: &LoopedSurface,
+    log_length: &EdgeVec<f64>,
+    signature: &Signature,
+    params: &FlowParams,
+    max_steps: usize,
+    observer: &dyn Observer,
+) -> Result<SeamlessMetric, SeamlessError> {
+    let start = Start {
+        connectivity: on.connectivity,
+        length: &on.length,
+        log_length: Some(log_length),
+        reflection: on.reflection(),
+        glued: &on.glued,
+    };
+    let params = SeamlessParams {
+        tolerance: params.curvature_tolerance,
+        conformality: params.conformality,
+        max_steps: max_steps.min(MOST_STEPS),
+    };
+    seamless(&start, &on.loops, signature, &params, observer)
+}
+
+/// The metric with the record of how it was found.
+pub(super) fn recorded(
+    mut metric: FlatMetric,
+    found: SeamlessMetric,
+    signature: &Signature,
+    met: QuarterTurns,
+) -> FlatMetric {
+    metric.history = found.history.iter().map(line).collect();
+    metric.max_curvature_error = found.max_error;
+    if let Some(record) = &mut metric.quarter_turns {
+        let turns = signature.turning.iter().copied();
+        **record = QuarterTurns {
+            loops: turns.zip(found.residual).collect(),
+            conformal_error: record.conformal_error,
+            ..met
+        };
+    }
+    metric
+}
+
+/// The metric that B has with other lengths (natural logarithms, Penner coordinates), whose Delaunay triangulation must be flat but for cones, and symmetric on a
+/// double. `lines`: edges of A on the mirror that shall be edges of C. The record of how it was found is empty.
+pub(crate) fn with_lengths(
+    surface: &Connectivity,
+    ground: SurfaceDelaunay,
+    log_length: EdgeVec<f64>,
+    lines: &[EdgeId],
+) -> Result<FlatMetric, FlowError> {
+    let parts = log_length.iter().zip(ground.log_length.iter());
+    let change: EdgeVec<f64> = parts.map(|(to, from)| to - from).collect();
+    let mut u = nearest_scale(&ground.delaunay, &change)?;
+    if !surface.is_closed() {
+        // Vertices are those of the double as it was made, whatever was flipped.
+        u = Reflection::new(&ground.base, surface.face_count()).mean(&u);
+    }
+    let conformal_error = conformal_error(&ground.delaunay, &change, &u);
+    let delaunay_penner = at_unit_scale(&ground.delaunay, &log_length, &u);
+    let (mut flat, mut shape) = flipped(&ground, log_length);
+    if !surface.is_closed() {
+        straighten_mirror(&mut flat, &ground.base, surface, lines)?;
+        let still = VertexVec::filled(0.0, ground.base.vertex_count());
+        flat.update_shapes(&still, &mut shape);
+    }
+    let c = &flat.connectivity;
+    let mut curvature = VertexVec::filled(TAU, c.vertex_count());
+    for (f, shape) in shape.enumerate() {
+        let corners = c.face_vertices(f).into_iter().zip(shape.angle);
+        corners.for_each(|(v, angle)| curvature[v] -= angle);
+    }
+    let half = |(v, k): (VertexId, &f64)| match surface.is_boundary_vertex(v) {
+        true => 0.5 * k,
+        false => *k,
+    };
+    let own = surface.vertex_count();
+    let log_length = flat.log_lengths();
+    let penner = at_unit_scale(c, &log_length, &u);
+    Ok(FlatMetric {
+        log_scale: u.as_slice()[..own].to_vec().into(),
+        length: log_length.iter().map(|l| l.exp()).collect(),
+        curvature: curvature.enumerate().take(own).map(half).collect(),
+        history: Vec::new(),
+        max_curvature_error: 0.0,
+        fit: None,
+        opened: None,
+        quarter_turns: Some(Box::new(QuarterTurns {
+            conformal_error,
+            ..QuarterTurns::default()
+        })),
+        intrinsic: Some(Box::new(ground.leave(
+            surface.face_count(),
+            flat,
+            penner,
+            u,
+            Some(delaunay_penner),
+        ))),
+    })
+}
+
+/// Makes the mirror an edge of the flat triangulation everywhere, so that nothing crosses it; where faces without width do not allow that, `lines` alone.
+fn straighten_mirror(
+    flat: &mut Delaunay,
+    base: &Connectivity,
+    surface: &Connectivity,
+    lines: &[EdgeId],
+) -> Result<(), StraightenError> {
+    let border = surface.halfedges().filter(|&h| surface.twin(h).is_none());
+    let mirror: Vec<EdgeId> = border.map(|h| base.edge(h)).collect();
+    let mut whole = flat.clone();
+    match straighten(&mut whole, base, &mirror) {
+        Ok(_) => *flat = whole,
+        Err(_) => {
+            straighten(flat, base, lines)?;
+        }
+    }
+    Ok(())
+}
+
+/// Root of the mean square and maximum of λ* − λ⁰ − (u_i + u_j) over all edges; `change`: of half the λ.
+fn conformal_error(c: &Connectivity, change: &EdgeVec<f64>, u: &VertexVec<f64>) -> [f64; 2] {
+    let of = |(e, change): (EdgeId, &f64)| {
+        let [i, j] = c.edge_vertices(e);
+        2.0 * change - (u[i] + u[j])
+    };
+    let (sum, most) = change
+        .enumerate()
+        .map(of)
+        .fold((0.0, 0.0), |(sum, most), x| {
+            (sum + x * x, f64::max(most, x.abs()))
+        });
+    [(sum / c.edge_count().max(1) as f64).sqrt(), most]
+}
+
+/// B with other lengths, flipped until it is Delaunay, with the shapes of its faces; told are the correspondences of A and of B with it.
+fn flipped(ground: &SurfaceDelaunay, log_length: EdgeVec<f64>) -> (Delaunay, FaceVec<FaceShape>) {
+    let b = &ground.delaunay;
+    let correspondences = vec![ground.base_on_delaunay.clone(), Correspondence::identity(b)];
+    let mut flat = Delaunay::from_logs(b.clone(), log_length, correspondences);
+    let mut shape = FaceVec::default();
+    flat.evaluate(&VertexVec::filled(0.0, b.vertex_count()), &mut shape);
+    (flat, shape)
+}
+
+/// A line of the convergence record.
+fn line(step: &SeamlessStep) -> FlowStep {
+    FlowStep {
+        iteration: step.iteration,
+        max_error: step.max_error,
+        energy: step.energy,
+        step: step.step,
+        flips: step.flips,
+        flow_time: step.iteration as f64,
+    }
+}
