@@ -96,10 +96,11 @@ impl Process {
     ) -> io::Result<Self> {
         let mut config = task.settings.config.clone();
         let is_share = config.run.memory == Limit::Auto;
-        // Paths need not be Unicode, and the worker has its own as arguments. Cones are in their list already.
+        // Paths need not be Unicode, and the worker has its own as arguments. Cones and features are in their lists already.
         config.input = Default::default();
         config.output = Default::default();
-        if let Some(file) = &mut config.cones.file {
+        let files = [&mut config.cones.file, &mut config.features.file];
+        for file in files.into_iter().flatten() {
             *file = file.to_string_lossy().into_owned().into();
         }
         let job = Job {

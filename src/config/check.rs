@@ -225,6 +225,18 @@ fn check_value(
                 }
             }
         }
+        (Kind::Rows, DeValue::Array(rows)) => {
+            for row in rows {
+                match row.get_ref() {
+                    DeValue::Array(items) if items.len() > 1 => {
+                        for item in items {
+                            check_value(source, path, keys::VERTEX, item, errors);
+                        }
+                    }
+                    _ => errors.push(wrong_type(row, kind)),
+                }
+            }
+        }
         (Kind::Tables(_), DeValue::Array(items)) => {
             for item in items {
                 match item.get_ref() {

@@ -176,25 +176,34 @@ pub enum ConfigError {
         /// What the key takes.
         allowed: String,
     },
-    /// `cones.file` cannot be read.
-    #[error("the cone file {} cannot be read: {reason}", path.display())]
-    NoConeFile {
+    /// A file of cones or features cannot be read.
+    #[error("`{key}` names {}, which cannot be read: {reason}", path.display())]
+    NoListFile {
+        /// The key that names it.
+        key: &'static str,
         /// Relative to the current folder or absolute.
         path: PathBuf,
         /// What the system said.
         reason: String,
     },
-    /// A line of `cones.file` that is no cone.
+    /// A line of such a file that is not understood.
     #[error("{at}: {reason}")]
-    ConeLine {
+    FileLine {
+        /// The key that names the file.
+        key: &'static str,
         /// Where.
         at: Box<Location>,
         /// Why.
         reason: String,
     },
-    /// Both ways of naming cones.
-    #[error("`cones.list` and `cones.file` both name cones")]
-    ListAndFile,
+    /// A list, and a file in its place.
+    #[error("`{list}` and `{file}` exclude each other")]
+    ListAndFile {
+        /// The key of the list.
+        list: &'static str,
+        /// The key of the file.
+        file: &'static str,
+    },
     /// A key for flat images, but patches that are not flat.
     #[error("`{key}` {does}, but `images.domain` is \"rectangle\"")]
     OnlyFlat {
@@ -239,12 +248,12 @@ impl ConfigError {
             Self::NotFound { .. }
             | Self::Unreadable { .. }
             | Self::TooLong { .. }
-            | Self::NoConeFile { .. }
-            | Self::ListAndFile
+            | Self::NoListFile { .. }
+            | Self::ListAndFile { .. }
             | Self::OnlyFlat { .. }
             | Self::OverrideWithoutValue { .. } => None,
             Self::Syntax { at, .. }
-            | Self::ConeLine { at, .. }
+            | Self::FileLine { at, .. }
             | Self::UnknownKey { at, .. }
             | Self::RemovedKey { at, .. }
             | Self::WrongType { at, .. }
@@ -273,19 +282,25 @@ impl ConfigError {
                 "write `--set section.key=value`, for example `--set flow.scheme=thurston`"
                     .to_owned()
             }
-            Self::NoConeFile { .. } => "`cones.file` starts at the configuration's folder (with \
-                 `--set` at the current one); check the name and that it is UTF-8 text"
-                .to_owned(),
-            Self::ConeLine { .. } => "each line holds the number of a vertex and its curvature in \
-                 radians, for example `17 1.570796`; `cones.file_first_vertex` says where numbers begin"
-                .to_owned(),
-            Self::ListAndFile => "remove one of them".to_owned(),
+            Self::NoListFile { key, .. } => format!(
+                "`{key}` starts at the configuration's folder (with `--set` at the current one); check the name and that it is UTF-8 text"
+            ),
+            Self::FileLine { key, .. } => {
+                let line = match *key {
+                    "cones.file" => {
+                        "the number of a vertex and its curvature in radians, for example `17 1.570796`"
+                    }
+                    _ => {
+                        "two vertices or more, each joined to the next by an edge, for example `17 18 25`"
+                    }
+                };
+                format!("each line holds {line}; `{key}_first_vertex` says where numbers begin")
+            }
+            Self::ListAndFile { .. } => "remove one of them".to_owned(),
             Self::OnlyFlat { key, .. } => {
                 format!("set `images.domain = \"flat\"`, or leave `{key}` out")
             }
-            Self::NotForOneAsset { .. } => {
-                "write it outside of the `[[asset]]` tables".to_owned()
-            }
+            Self::NotForOneAsset { .. } => "write it outside of the `[[asset]]` tables".to_owned(),
             Self::NotOnePattern { .. } => {
                 "give one of them, for example `glob = \"scans/*.ply\"`".to_owned()
             }

@@ -56,6 +56,8 @@ pub enum Kind {
     Curvatures,
     /// Three coordinates.
     Point,
+    /// A list of lists of vertices of the input file.
+    Rows,
     /// A list of tables; their keys are listed as `key[].name`. Holds an example of one.
     Tables(&'static str),
 }
@@ -95,6 +97,7 @@ impl fmt::Display for Kind {
                     "a list of numbers or fractions such as [\"1/2\", \"-8\"]"
                 )
             }
+            Self::Rows => write!(f, "a list of lists of vertices such as [[0, 1, 2], [7, 8]]"),
             Self::Point => write!(f, "three numbers such as [0.0, 1.5, -2.0]"),
             Self::Tables(example) => write!(f, "a list of tables such as {example}"),
         }
@@ -161,7 +164,8 @@ const CORNER_EXAMPLE: &str = "[{ vertex = 0 }, { vertex = 7 }, { vertex = 63 }, 
 /// Vertex indices are stored in 32 bits and 2³²−1 means "none".
 const MAX_INDEX: i64 = u32::MAX as i64 - 1;
 /// The number of a vertex of the input file.
-const VERTEX: Kind = Kind::Integer {
+/// A vertex of the input file.
+pub const VERTEX: Kind = Kind::Integer {
     min: 0,
     max: MAX_INDEX,
 };
@@ -360,6 +364,19 @@ pub const KEYS: &[Key] = &[
         "40.0",
     ),
     key("features.materials", Kind::Bool, "", "false"),
+    key(
+        "features.list",
+        Kind::Rows,
+        "vertices of the input file, counted from 0",
+        "[]",
+    ),
+    key("features.file", Kind::Text, "", "absent"),
+    key(
+        "features.file_first_vertex",
+        Kind::Integer { min: 0, max: 1 },
+        "",
+        "0",
+    ),
     key("connectivity.enabled", Kind::Bool, "", "absent"),
     key(
         "connectivity.rings",

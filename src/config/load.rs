@@ -1,11 +1,12 @@
-//! From text and overrides to a [`Config`], cones of a cone file included.
+//! From text and overrides to a [`Config`], files of cones and features included.
 
 use super::Config;
 use super::error::{ConfigError, Location};
 use super::layers::{Layers, merge, parse_layer};
 use super::overrides::Override;
 use super::source::Source;
-use crate::flow::cones;
+use crate::flow::columns::ColumnError;
+use crate::flow::{cones, features};
 use crate::read::bounded::read_bounded;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -26,12 +27,14 @@ pub struct Loaded {
     pub input_base: PathBuf,
     /// Folder that a relative `output.folder` starts from, by the same rule.
     pub output_base: PathBuf,
-    /// Files that were read: the configuration and cone files.
+    /// Files that were read: the configuration, and files of cones and features.
     pub files: Vec<PathBuf>,
     /// What `config` was made of.
     layers: Layers,
     /// Folder that a relative `cones.file` starts from, by the same rule.
     cones_base: PathBuf,
+    /// The same of `features.file`.
+    features_base: PathBuf,
 }
 
 impl Loaded {
@@ -56,18 +59,20 @@ impl Loaded {
             .collect()
     }
 
-    /// The effective configuration of the meshes for which these of the `[[asset]]` tables are, cones of a cone file included.
+    /// The effective configuration of the meshes for which these of the `[[asset]]` tables are, what files of cones and features say included.
     /// What concerns the whole run is as in `config`.
     ///
     /// # Errors
-    /// As [`load`], where tables do not fit each other or the rest, or a cone file cannot be used.
+    /// As [`load`], where tables do not fit each other or the rest, or a file of cones or features cannot be used.
     pub fn config_with(&mut self, overrides: &[usize]) -> Result<Config, ConfigError> {
         if overrides.is_empty() {
             return Ok(self.config.clone());
         }
         let mut config = self.layers.config(overrides)?;
-        let cones = read_cones(&mut config, &self.cones_base)?;
-        self.files.extend(cones);
+        self.files
+            .extend(read_cones(&mut config, &self.cones_base)?);
+        self.files
+            .extend(read_features(&mut config, &self.features_base)?);
         config.input = self.config.input.clone();
         config.output = self.config.output.clone();
         Ok(config)
@@ -111,6 +116,8 @@ fn finish(
     let mut config = layers.config(&[])?;
     let cones_base = base_of("cones.file");
     files.extend(read_cones(&mut config, &cones_base)?);
+    let features_base = base_of("features.file");
+    files.extend(read_features(&mut config, &features_base)?);
     Ok(Loaded {
         input_base: base_of("input.paths"),
         output_base: base_of("output.folder"),
@@ -118,6 +125,7 @@ fn finish(
         files,
         layers,
         cones_base,
+        features_base,
     })
 }
 
@@ -129,32 +137,63 @@ fn read_cones(config: &mut Config, base: &Path) -> Result<Option<PathBuf>, Confi
         return Ok(None);
     };
     if !params.list.is_empty() {
-        return Err(ConfigError::ListAndFile);
+        let (list, file) = ("cones.list", "cones.file");
+        return Err(ConfigError::ListAndFile { list, file });
     }
     let path = base.join(given);
-    let text = read_text(&path).map_err(|error| ConfigError::NoConeFile {
-        reason: match error {
-            ConfigError::NotFound { .. } => "there is no such file".to_owned(),
-            ConfigError::TooLong { bytes, limit, .. } => {
-                format!("it has {bytes} bytes, but a cone file has at most {limit}")
-            }
-            ConfigError::Unreadable { reason, .. } => reason,
-            other => other.to_string(),
-        },
-        path: path.clone(),
-    })?;
-    let cones = cones::file::parse(&text, params.file_first_vertex).map_err(|error| {
-        let at = Location::new(&path.display().to_string(), &Arc::from(text), error.span);
-        ConfigError::ConeLine {
-            at: Box::new(at),
-            reason: error.reason,
-        }
-    })?;
+    let first = params.file_first_vertex;
+    let parse = |text: &str| cones::file::parse(text, first);
+    let cones = read_list("cones.file", &path, parse)?;
     (params.file_lines, params.list) = cones.into_iter().unzip();
     Ok(Some(path))
 }
 
-/// Parses a configuration text; `name` is what errors call it. An empty text gives the defaults. A cone file is not read, and `[[asset]]`
+/// Puts the edges of `features.file` into `features.list`; see [`read_cones`].
+fn read_features(config: &mut Config, base: &Path) -> Result<Option<PathBuf>, ConfigError> {
+    let params = &mut config.features;
+    let Some(given) = &params.file else {
+        return Ok(None);
+    };
+    if !params.list.is_empty() {
+        let (list, file) = ("features.list", "features.file");
+        return Err(ConfigError::ListAndFile { list, file });
+    }
+    let path = base.join(given);
+    let first = params.file_first_vertex;
+    let parse = |text: &str| features::file::parse(text, first);
+    params.list = read_list("features.file", &path, parse)?;
+    Ok(Some(path))
+}
+
+/// What stands in a file that `key` names.
+fn read_list<T>(
+    key: &'static str,
+    path: &Path,
+    parse: impl Fn(&str) -> Result<T, ColumnError>,
+) -> Result<T, ConfigError> {
+    let text = read_text(path).map_err(|error| ConfigError::NoListFile {
+        key,
+        reason: match error {
+            ConfigError::NotFound { .. } => "there is no such file".to_owned(),
+            ConfigError::TooLong { bytes, limit, .. } => {
+                format!("it has {bytes} bytes, but such a file has at most {limit}")
+            }
+            ConfigError::Unreadable { reason, .. } => reason,
+            other => other.to_string(),
+        },
+        path: path.to_owned(),
+    })?;
+    parse(&text).map_err(|error| {
+        let at = Location::new(&path.display().to_string(), &Arc::from(text), error.span);
+        ConfigError::FileLine {
+            key,
+            at: Box::new(at),
+            reason: error.reason,
+        }
+    })
+}
+
+/// Parses a configuration text; `name` is what errors call it. An empty text gives the defaults. Files of cones and features are not read, and `[[asset]]`
 /// tables are checked but are not in effect.
 ///
 /// # Errors

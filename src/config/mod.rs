@@ -89,7 +89,7 @@ pub struct Config {
 
 impl Config {
     /// The effective configuration without what cannot change an output byte of one asset: the
-    /// list of inputs, the output folder, the number of threads, and where the cones were read from once they are in the list.
+    /// list of inputs, the output folder, the number of threads, and where cones and features were read from once they are in their lists.
     #[must_use]
     pub fn canonical(&self) -> Self {
         let mut cones = self.cones.clone();
@@ -98,8 +98,14 @@ impl Config {
             cones.file = Some(PathBuf::new());
             cones.file_first_vertex = 0;
         }
+        let mut features = self.features.clone();
+        if !features.list.is_empty() {
+            features.file = None;
+            features.file_first_vertex = 0;
+        }
         Self {
             cones,
+            features,
             input: InputParams::default(),
             output: OutputParams::default(),
             run: RunParams::default(),

@@ -547,7 +547,7 @@ fn a_cone_file_becomes_the_list() {
     assert_eq!(defaults(&set).expect("loads").config.cones.list, cones.list);
     assert!(matches!(
         load(&file, &["cones.file=my.cones.txt".to_owned()]),
-        Err(ConfigError::NoConeFile { .. })
+        Err(ConfigError::NoListFile { .. })
     ));
 }
 
@@ -576,18 +576,49 @@ fn cone_files_that_are_refused() {
     assert_eq!((at.line, at.column, at.offending()), (2, 3, "half"));
     assert!(error.remedy().contains("17 1.570796"), "{}", error.remedy());
     let error = refused("3 1.57\n", "list = [{ vertex = 0, curvature = 1 }]");
-    assert_eq!(error, ConfigError::ListAndFile);
+    assert!(matches!(error, ConfigError::ListAndFile { .. }), "{error}");
     let (folder, file) = with_cone_file("", "");
     std::fs::remove_file(folder.path().join("my.cones.txt")).expect("removed");
     let error = load(&file, &[]).expect_err("missing");
     let text = error.to_string();
     assert!(
-        text.ends_with("my.cones.txt cannot be read: there is no such file"),
+        text.ends_with("my.cones.txt, which cannot be read: there is no such file"),
         "{text}"
     );
     std::fs::write(folder.path().join("my.cones.txt"), [b'3', 0xff]).expect("written");
     let text = load(&file, &[]).expect_err("no UTF-8").to_string();
     assert!(text.ends_with("byte 1 is not UTF-8 text"), "{text}");
+}
+
+#[test]
+fn a_file_of_features_becomes_the_list() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("my.toml");
+    let edges = folder.path().join("edges.txt");
+    let written = |text: &str, keys: &str| {
+        std::fs::write(&edges, text).expect("written");
+        let keys = format!("[features]\nfile = \"edges.txt\"\n{keys}\n");
+        std::fs::write(&file, keys).expect("written");
+        load(&file, &[])
+    };
+    let loaded = written("# seam\n1 2 3\n7 8\n", "file_first_vertex = 1").expect("loads");
+    assert_eq!(loaded.config.features.list, [vec![0, 1, 2], vec![6, 7]]);
+    assert!(loaded.files.contains(&edges), "{:?}", loaded.files);
+    // What it says counts, and not how.
+    let listed = parse("f", "[features]\nlist = [[0, 1, 2], [6, 7]]", &[]).expect("parses");
+    assert_eq!(loaded.config.hash(), listed.hash());
+    assert_ne!(listed.hash(), Config::default().hash());
+    let error = written("1 2\n3 x\n", "").expect_err("no number");
+    let at = error.location().expect("in the file");
+    assert_eq!((at.line, at.column, at.offending()), (2, 3, "x"));
+    assert!(error.remedy().contains("`17 18 25`"), "{}", error.remedy());
+    let error = written("1 2\n", "list = [[1, 2]]").expect_err("twice");
+    assert!(matches!(error, ConfigError::ListAndFile { .. }), "{error}");
+    for (list, place) in [("[[1]]", "[1]"), ("[[1, -2]]", "-2"), ("[7]", "7")] {
+        let text = format!("[features]\nlist = {list}");
+        let error = parse("f", &text, &[]).expect_err(list);
+        assert_eq!(error.location().expect("there").offending(), place);
+    }
 }
 
 #[test]

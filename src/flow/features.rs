@@ -1,14 +1,17 @@
 //! Sharp edges and borders between materials, as chains that shall become straight lines of the atlas.
 //!
-//! *Enters:* a mesh. *Leaves:* chains of edges between junctions, the most important first. *Guaranteed:* the chains of a spanning forest come before those that close
+//! *Enters:* a mesh, and edges that the user names. *Leaves:* chains of edges between junctions, the most important first. *Guaranteed:* the chains of a spanning forest come before those that close
 //! cycles, since a cycle may ask for more than any metric has and a forest never does; the same order for the same mesh. *Not guaranteed:* that all of them can be met.
+
+pub mod file;
 
 use crate::geometry::disjoint_sets::UnionFind;
 use crate::geometry::ids::{EdgeId, EdgeVec, VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, cross, dot, sub};
 use std::cmp::Ordering;
+use std::path::PathBuf;
 
-/// Fewest edges of a chain that counts: shorter ones are mostly noise.
+/// Fewest edges of a chain that counts where nobody named them: shorter ones are mostly noise.
 pub const LEAST_EDGES: usize = 5;
 
 /// Sine of the angle at a corner below which a face has no direction.
@@ -22,6 +25,13 @@ pub struct FeatureParams {
     pub angle: f64,
     /// Edges between faces of different materials too.
     pub materials: bool,
+    /// Edges by name, in place of those that `angle` finds: vertices of the input file in a row, each joined to the next.
+    pub list: Vec<Vec<u32>>,
+    /// File with rows of vertices, one a line. [`crate::config::load`] puts them into `list`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+    /// Number of the first vertex in `file`: 0 or 1.
+    pub file_first_vertex: u32,
 }
 
 impl Default for FeatureParams {
@@ -29,6 +39,9 @@ impl Default for FeatureParams {
         Self {
             angle: 40.0,
             materials: false,
+            list: Vec::new(),
+            file: None,
+            file_first_vertex: 0,
         }
     }
 }
@@ -53,20 +66,24 @@ impl Feature {
     }
 }
 
-/// The features of a mesh, the most important first; see the module docs.
-pub fn features(mesh: &Mesh, params: &FeatureParams) -> Vec<Feature> {
+/// The features of a mesh, the most important first; see the module docs. `named` are the edges of the list that it has.
+pub fn features(mesh: &Mesh, params: &FeatureParams, named: &[EdgeId]) -> Vec<Feature> {
     let c = &mesh.connectivity;
     let bend: EdgeVec<f64> = c.edges().map(|e| bend(mesh, e)).collect();
     let least = params.angle.to_radians();
+    let by_angle = params.list.is_empty() && params.angle < 180.0;
+    let mut is_named = EdgeVec::filled(false, c.edge_count());
+    named.iter().for_each(|&e| is_named[e] = true);
     let is_sharp = |e: EdgeId| {
         let between = params.materials && is_between_materials(mesh, e);
-        !c.is_boundary_edge(e) && (between || (params.angle < 180.0 && bend[e] >= least))
+        let is_one = between || is_named[e] || (by_angle && bend[e] >= least);
+        is_one && !c.is_boundary_edge(e)
     };
     let sharp: EdgeVec<bool> = c.edges().map(is_sharp).collect();
     let mut found: Vec<Feature> = chains(mesh, &sharp)
         .into_iter()
-        .filter(|chain| chain.len() > LEAST_EDGES)
         .map(|chain| feature(mesh, &bend, chain))
+        .filter(|f| f.edges.len() >= LEAST_EDGES || f.edges.iter().any(|&e| is_named[e]))
         .collect();
     found.sort_by(|a, b| {
         let order = b.importance().partial_cmp(&a.importance());

@@ -1,4 +1,5 @@
 //! From a prescription of curvature to a flat cone metric: sections 3 and 4 of the tutorial.
+pub mod columns;
 pub mod cones;
 pub mod correspondence;
 pub mod delaunay;

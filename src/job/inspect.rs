@@ -51,7 +51,7 @@ pub fn inspect(path: &Path, config: &Config) -> Result<Inspection, BuildError> {
     let asset = read::read(path, &config.limits)?;
     let soup = &asset.soup;
     let repaired = repair::repair(soup, &config.repair)?;
-    let requests = cones::assign(&repaired, &config.cones, &config.boundary)?;
+    let requests = cones::assign(&repaired, &config.cones, &config.boundary, &config.features)?;
     let mut text = String::new();
     let count = repaired.components.len();
     let mut line = |s: String| {

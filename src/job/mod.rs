@@ -80,7 +80,7 @@ fn each(
 ) -> Result<(), BuildError> {
     observer.stage("repair", 0, 1);
     let repaired = repair::repair(soup, &config.repair)?;
-    let requests = cones::assign(&repaired, &config.cones, &config.boundary)?;
+    let requests = cones::assign(&repaired, &config.cones, &config.boundary, &config.features)?;
     let config = &Config {
         images: config.images.held_by(soup),
         ..config.clone()

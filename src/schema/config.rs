@@ -1,7 +1,7 @@
 //! The schema of `config.toml`, so that editors complete and check it.
 
 use super::DRAFT;
-use crate::config::keys::{KEYS, Key, Kind};
+use crate::config::keys::{self, KEYS, Key, Kind};
 use crate::config::scope::OF_THE_RUN;
 use crate::config::{COMMENTED_DEFAULT, Limit};
 use serde_json::{Map, Value, json};
@@ -140,6 +140,10 @@ fn of_kind(kind: Kind) -> Value {
         Kind::Point => json!({
             "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3,
         }),
+        Kind::Rows => {
+            let row = json!({ "type": "array", "items": of_kind(keys::VERTEX), "minItems": 2 });
+            json!({ "type": "array", "items": row })
+        }
         Kind::Tables(_) => json!({ "type": "array", "items": object("") }),
     }
 }

@@ -1,6 +1,6 @@
 //! Sharp edges as lines of the atlas, on a part with junctions of three and four of them.
 
-use crate::command::{build_small, verify};
+use crate::command::{build_small, document, verify};
 use crate::real_models::lines::lines;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -91,4 +91,63 @@ fn sharp_edges_of_a_part_are_lines() {
     let without = build_small(&mesh, &[&SEAMLESS[..], &["features.angle=180"]].concat());
     let free = lines(&without.atlas());
     assert!(free.share() < 0.5, "{:.3}: {free:?}", free.share());
+}
+
+/// Edges that a file names are lines, however smooth and few, and others are not.
+#[test]
+fn edges_of_a_file_are_lines() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (mesh, edges) = (
+        folder.path().join("part.obj"),
+        folder.path().join("edges.txt"),
+    );
+    let text = part();
+    std::fs::write(&mesh, &text).expect("writable");
+    // An edge inside a side of a cube, where vertices have four faces and eight by turns.
+    let faces: Vec<Vec<usize>> = (text.lines().filter_map(|line| line.strip_prefix("f ")))
+        .map(|face| {
+            face.split(' ')
+                .map(|v| v.parse().expect("a number"))
+                .collect()
+        })
+        .collect();
+    let degree = |v: usize| faces.iter().filter(|face| face.contains(&v)).count();
+    let inside = |face: &&Vec<usize>| face.iter().all(|&v| [4, 8].contains(&degree(v)));
+    let [a, b, ..] = faces.iter().find(inside).expect("a face inside")[..] else {
+        panic!("a face has three vertices");
+    };
+    let build = |row: &str, first: &str| {
+        std::fs::write(&edges, row).expect("writable");
+        let file = format!("features.file={}", edges.display());
+        let first = format!("features.file_first_vertex={first}");
+        let asked: [&str; 4] = [SEAMLESS[0], SEAMLESS[1], &file, &first];
+        build_small(&mesh, &asked)
+    };
+    let built = build(&format!("{a} {b} # as in the OBJ\n"), "1");
+    assert_eq!(built.code(), Some(0), "{}", built.message());
+    let atlas = built.atlas();
+    verify(&atlas);
+    let document = document(&atlas);
+    let features = document["features"].as_array().expect("features");
+    assert_eq!(features.len(), 1, "{features:?}");
+    assert_eq!(features[0]["is_line"], true);
+    assert_eq!(features[0]["vertices"].as_array().map(Vec::len), Some(2));
+    // Counted from 0 as they stand, the same numbers are other vertices.
+    let far = faces.last().expect("a face")[0];
+    let refused = build(&format!("{a} {b}\n{a} {far}\n"), "1");
+    let message = refused.message();
+    let named = format!("an edge from vertex {a} to vertex {far}, but no face");
+    assert!(message.contains(&named), "{message}");
+    let refused = build("0 100000\n", "0");
+    let message = refused.message();
+    assert!(
+        message.contains("features.file names vertex 100000"),
+        "{message}"
+    );
+    let listed = ["features.list=[[0, 1]]"];
+    let message = build_small(&mesh, &listed).message();
+    assert!(
+        message.contains("features.list and cones.strategy = \"auto\" exclude"),
+        "{message}"
+    );
 }

@@ -72,6 +72,27 @@ pub enum ConeError {
         /// As written.
         path: std::path::PathBuf,
     },
+    /// A file of features that nobody read.
+    #[error(
+        "features.file names {}, but it was not read: load the configuration with config::load, or fill features.list with features::file::parse",
+        path.display()
+    )]
+    FeaturesNotRead {
+        /// As written.
+        path: std::path::PathBuf,
+    },
+    /// Two vertices that no edge joins.
+    #[error(
+        "{key} names an edge from vertex {} to vertex {}, but no face of the repaired surface has it: name vertices that an edge joins",
+        ends[0],
+        ends[1]
+    )]
+    NoSuchEdge {
+        /// Where in the configuration.
+        key: String,
+        /// Its ends, as they were given.
+        ends: [u64; 2],
+    },
     /// `prescribed` without a list.
     #[error(
         "boundary.condition is \"prescribed\", but boundary.list is empty: add boundary vertices or set the condition to \"uniform\""

@@ -1,6 +1,6 @@
 //! Cones where the smoothest cross field is singular: multiples of π/2 that follow the shape.
 //!
-//! *Enters:* a mesh. *Leaves:* cones and corners of the border, and what else the field says, so that a flow to quarter turns can follow it.
+//! *Enters:* a mesh, and which edges shall be lines. *Leaves:* cones and corners of the border, and what else the field says, so that a flow to quarter turns can follow it.
 //! *Guaranteed:* cones have at least three quarter turns, corners of the border and sectors between features at least one, as in a grid of quads. *Not guaranteed:* few cones: there are as many
 //! as the shape asks for.
 
@@ -29,8 +29,9 @@ const GIVEN_UP: usize = 8;
 pub(super) fn select(
     mesh: &Mesh,
     params: &FeatureParams,
+    named: &[EdgeId],
 ) -> Result<(Vec<RequestedCone>, FromField), ConeError> {
-    let mut kept = features(mesh, params);
+    let mut kept = features(mesh, params, named);
     let mut crowded = Vec::new();
     loop {
         match along(mesh, &kept) {

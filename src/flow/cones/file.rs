@@ -2,67 +2,50 @@
 //!
 //! *Enters:* a text whose lines hold the number of a vertex and its curvature in radians, and the number that the text gives
 //! the first vertex (0 as in CEPS, 1 as in MovingCones). *Leaves:* the cones in the order of their lines, every
-//! curvature to the last bit, or a [`ConeFileError`] with the place. Blank lines and what follows a `#` are skipped.
+//! curvature to the last bit, or a [`ColumnError`] with the place. Blank lines and what follows a `#` are skipped.
 //!
 //! *Guaranteed:* no vertex twice, all numbers finite; [`write()`] and [`parse`] are inverse to each other.
 //! *Not guaranteed:* that the mesh has such vertices, nor Gauss–Bonnet: both are checked where the mesh is known.
 
 use super::params::ConeSpec;
+use crate::flow::columns::{self, ColumnError};
 use crate::flow::pi_multiple::PiMultiple;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::ops::Range;
-
-/// What is wrong with a text, and where.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{reason}")]
-pub struct ConeFileError {
-    /// The offending bytes.
-    pub span: Range<usize>,
-    /// One sentence without the place.
-    pub reason: String,
-}
 
 /// Reads a text; gives each cone with its line, counted from 1. `first_vertex` is the number that it gives the first vertex.
 ///
 /// # Errors
 /// The first line that holds no number, more or fewer than two columns, a vertex below `first_vertex` or one that an earlier
 /// line has; and a text without any cone.
-pub fn parse(text: &str, first_vertex: u32) -> Result<Vec<(u32, ConeSpec)>, ConeFileError> {
+pub fn parse(text: &str, first_vertex: u32) -> Result<Vec<(u32, ConeSpec)>, ColumnError> {
     let mut cones = Vec::new();
     let mut lines_of = BTreeMap::new();
-    let mut start = 0;
-    for (number, whole) in (1_u32..).zip(text.split_inclusive('\n')) {
-        let content = whole.split('#').next().unwrap_or("");
-        let content = content.trim_start_matches('\u{feff}');
-        let skipped = whole.find(content).unwrap_or(0);
-        let columns: Vec<Range<usize>> = columns(content)
-            .map(|c| start + skipped + c.start..start + skipped + c.end)
-            .collect();
-        start += whole.len();
-        let (vertex_at, curvature_at) = match &columns[..] {
-            [] => continue,
+    for (number, words) in columns::lines(text) {
+        let (vertex_at, curvature_at) = match &words[..] {
             [vertex, curvature] => (vertex.clone(), curvature.clone()),
-            [first, .., last] | [first @ last] => {
-                return Err(ConeFileError {
-                    span: first.start..last.end,
+            words => {
+                let end = words.last().map_or(0, |last| last.end);
+                return Err(ColumnError {
+                    span: words.first().map_or(0, |first| first.start)..end,
                     reason: format!(
                         "a line of cones.file must have 2 columns, a vertex and a curvature in radians, but this has {}",
-                        columns.len()
+                        words.len()
                     ),
                 });
             }
         };
-        let vertex = vertex(&text[vertex_at.clone()], first_vertex).map_err(|reason| {
-            let span = vertex_at.clone();
-            ConeFileError { span, reason }
-        })?;
+        let vertex = columns::vertex(&text[vertex_at.clone()], first_vertex, "cones.file")
+            .map_err(|reason| {
+                let span = vertex_at.clone();
+                ColumnError { span, reason }
+            })?;
         let curvature = curvature(&text[curvature_at.clone()]).map_err(|reason| {
             let span = curvature_at;
-            ConeFileError { span, reason }
+            ColumnError { span, reason }
         })?;
         if let Some(earlier) = lines_of.insert(vertex, number) {
-            return Err(ConeFileError {
+            return Err(ColumnError {
                 reason: format!(
                     "vertex {} has a cone on line {earlier} already",
                     &text[vertex_at.clone()]
@@ -80,7 +63,7 @@ pub fn parse(text: &str, first_vertex: u32) -> Result<Vec<(u32, ConeSpec)>, Cone
         ));
     }
     if cones.is_empty() {
-        return Err(ConeFileError {
+        return Err(ColumnError {
             span: 0..0,
             reason: "the file names no cone".to_owned(),
         });
@@ -88,53 +71,14 @@ pub fn parse(text: &str, first_vertex: u32) -> Result<Vec<(u32, ConeSpec)>, Cone
     Ok(cones)
 }
 
-/// Where the columns of a line are.
-fn columns(line: &str) -> impl Iterator<Item = Range<usize>> + '_ {
-    line.split_whitespace().map(move |word| {
-        // The words are parts of the line, so that their distance from its start is their place.
-        let start = word.as_ptr() as usize - line.as_ptr() as usize;
-        start..start + word.len()
-    })
-}
-
-fn vertex(word: &str, first_vertex: u32) -> Result<u32, String> {
-    let number: u64 = word.parse().map_err(|_| {
-        format!(
-            "a line of cones.file begins with the number of a vertex, but {} is none",
-            shown(word)
-        )
-    })?;
-    let Some(vertex) = number.checked_sub(u64::from(first_vertex)) else {
-        return Err(format!(
-            "the vertices of this file count from {first_vertex}, but it names vertex {number}: set cones.file_first_vertex = 0 if they count from 0"
-        ));
-    };
-    match u32::try_from(vertex) {
-        Ok(vertex) if vertex < u32::MAX => Ok(vertex),
-        _ => Err(format!(
-            "vertex {number} is more than any mesh has ({})",
-            u32::MAX - 1
-        )),
-    }
-}
-
 fn curvature(word: &str) -> Result<PiMultiple, String> {
     let curvature = word.parse().ok().and_then(PiMultiple::from_radians);
     curvature.ok_or_else(|| {
         format!(
             "a curvature is a finite number of radians, but {} is none",
-            shown(word)
+            columns::shown(word)
         )
     })
-}
-
-/// A word of the text in quotes, shortened where it is long.
-fn shown(word: &str) -> String {
-    let mut start: String = word.chars().take(40).collect();
-    if start.len() < word.len() {
-        start.push('…');
-    }
-    format!("{start:?}")
 }
 
 /// The text of cones that are given by vertex (from 0) and curvature, radians; curvatures in 17 digits, from which every bit

@@ -3,10 +3,12 @@
 use super::error::ConeError;
 use super::params::{BoundaryParams, ConeParams, ConeSpec, ConeStrategy};
 use super::spread;
+use crate::flow::features::FeatureParams;
 use crate::flow::prescription::BoundaryCondition;
-use crate::geometry::ids::{NONE, VertexId};
+use crate::geometry::ids::{EdgeId, NONE, VertexId};
 use crate::geometry::mesh::{Mesh, distance};
 use crate::repair::Repaired;
+use std::collections::BTreeMap;
 
 /// A cone at a vertex of a component.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +32,8 @@ pub struct Requests {
     pub corners: Vec<(VertexId, u32)>,
     /// Boundary vertices with a curvature of their own.
     pub boundary: Vec<RequestedCone>,
+    /// Edges that shall become lines.
+    pub features: Vec<EdgeId>,
 }
 
 /// Finds the component and vertex of everything that the user names: one [`Requests`] a component, in their order.
@@ -38,8 +42,9 @@ pub fn assign(
     repaired: &Repaired,
     cones: &ConeParams,
     boundary: &BoundaryParams,
+    features: &FeatureParams,
 ) -> Result<Vec<Requests>, ConeError> {
-    check_keys(cones, boundary)?;
+    check_keys(cones, boundary, features)?;
     let mut requests = vec![Requests::default(); repaired.components.len()];
     for (i, spec) in cones.list.iter().enumerate() {
         let key = key_of_cone(cones, i, spec);
@@ -78,7 +83,72 @@ pub fn assign(
             requests[component].corners.push((vertex, named));
         }
     }
+    assign_features(repaired, features, &mut requests)?;
     Ok(requests)
+}
+
+/// Finds the edges of `features.list`. Where the input has an edge of more than two faces, repair leaves it in pieces: each is one.
+fn assign_features(
+    repaired: &Repaired,
+    features: &FeatureParams,
+    requests: &mut [Requests],
+) -> Result<(), ConeError> {
+    if features.list.is_empty() {
+        return Ok(());
+    }
+    let meshes = repaired.components.iter().enumerate();
+    let meshes = meshes.filter_map(|(i, component)| Some((i, component.mesh.as_ref().ok()?)));
+    let mut edges_of: BTreeMap<[u32; 2], Vec<(usize, EdgeId)>> = BTreeMap::new();
+    for (i, mesh) in meshes {
+        for e in mesh.connectivity.edges() {
+            let mut ends = mesh.connectivity.edge_vertices(e);
+            ends.sort_by_key(|&v| mesh.source_vertex[v]);
+            let ends = ends.map(|v| mesh.source_vertex[v]);
+            edges_of.entry(ends).or_default().push((i, e));
+        }
+    }
+    let first = features.file_first_vertex;
+    let key = features
+        .file
+        .as_ref()
+        .map_or("features.list", |_| "features.file");
+    let given = |vertex: u32| u64::from(vertex) + u64::from(first);
+    let key_of = |vertex: u32| match first {
+        0 => key.to_owned(),
+        _ => format!(
+            "{key} ({} there, where vertices count from {first})",
+            given(vertex)
+        ),
+    };
+    for pair in features.list.iter().flat_map(|row| row.windows(2)) {
+        let mut ends = [NONE; 2];
+        let mut is_built = true;
+        for (end, &vertex) in ends.iter_mut().zip(pair) {
+            let place = find(repaired, &key_of(vertex), Some(vertex), None, |_, _| true)?;
+            // The one that stands for all that were welded.
+            match place {
+                Some((i, v, _)) => {
+                    let mesh = repaired.components[i].mesh.as_ref();
+                    *end = mesh.map_or(NONE, |mesh| mesh.source_vertex[v]);
+                }
+                None => is_built = false,
+            }
+        }
+        if !is_built || ends[0] == ends[1] {
+            continue;
+        }
+        ends.sort_unstable();
+        let Some(found) = edges_of.get(&ends) else {
+            return Err(ConeError::NoSuchEdge {
+                key: key.to_owned(),
+                ends: [given(pair[0]), given(pair[1])],
+            });
+        };
+        for &(i, e) in found {
+            requests[i].features.push(e);
+        }
+    }
+    Ok(())
 }
 
 /// How messages name an entry of the list: by its line where it was read from a file.
@@ -95,7 +165,11 @@ fn key_of_cone(cones: &ConeParams, index: usize, spec: &ConeSpec) -> String {
 }
 
 /// Keys that say two different things.
-fn check_keys(cones: &ConeParams, boundary: &BoundaryParams) -> Result<(), ConeError> {
+fn check_keys(
+    cones: &ConeParams,
+    boundary: &BoundaryParams,
+    features: &FeatureParams,
+) -> Result<(), ConeError> {
     let conflict = |first: &str, second: String| {
         Err(ConeError::Conflict {
             first: first.into(),
@@ -121,6 +195,18 @@ fn check_keys(cones: &ConeParams, boundary: &BoundaryParams) -> Result<(), ConeE
     }
     if cones.curvature.is_some() && cones.strategy != ConeStrategy::Spread {
         return conflict("cones.curvature", name(cones.strategy));
+    }
+    match (&features.file, cones.strategy) {
+        // Only where somebody made the parameters by hand.
+        (Some(path), _) if features.list.is_empty() => {
+            return Err(ConeError::FeaturesNotRead { path: path.clone() });
+        }
+        (_, ConeStrategy::Field) => {}
+        (file, other) if !features.list.is_empty() => {
+            let given = file.as_ref().map_or("features.list", |_| "features.file");
+            return conflict(given, name(other));
+        }
+        _ => {}
     }
     let condition = boundary.effective_condition();
     let shown = format!("boundary.condition = \"{}\"", condition.name());

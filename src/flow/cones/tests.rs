@@ -109,7 +109,7 @@ fn all(
     cones: &ConeParams,
     boundary: &BoundaryParams,
 ) -> Result<Vec<Prescription>, ConeError> {
-    let requests = assign(repaired, cones, boundary)?;
+    let requests = assign(repaired, cones, boundary, &Default::default())?;
     let components = repaired.components.iter().zip(&requests);
     components
         .map(|(c, r)| {

@@ -556,7 +556,7 @@ fn single_cones_of_real_models() {
                 ..ConeParams::default()
             };
             let boundary = BoundaryParams::default();
-            let requests = assign(&repaired, &cones, &boundary).unwrap();
+            let requests = assign(&repaired, &cones, &boundary, &Default::default()).unwrap();
             let prescription =
                 prescribe(mesh, &requests[0], &cones, &boundary, &Default::default()).unwrap();
             let cone = prescription.cones[0];

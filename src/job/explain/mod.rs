@@ -94,7 +94,8 @@ pub fn mesh(path: &Path, config: &Config) -> Result<Explanation, BuildError> {
     if !repaired.log.is_empty() {
         explanation.say("", failure::repairs(&repaired.log));
     }
-    let requests = match cones::assign(&repaired, &config.cones, &config.boundary) {
+    let requests = match cones::assign(&repaired, &config.cones, &config.boundary, &config.features)
+    {
         Ok(requests) => requests,
         Err(error) => {
             explanation.refuse("", "mesh".into(), &error.into(), soup);

@@ -117,7 +117,8 @@ pub fn survey(
     let repaired = repair::repair(soup, &config.repair)?;
     // What is wrong with the configuration is said once, not in every row.
     let automatic = with_cones(config, ConeStrategy::Auto, COMPARED);
-    cones::assign(&repaired, &automatic.cones, &automatic.boundary)?;
+    let features = &automatic.features;
+    cones::assign(&repaired, &automatic.cones, &automatic.boundary, features)?;
     let surveyed = (0..repaired.components.len()).map(|index| {
         let task = Task {
             repaired: &repaired,
@@ -145,6 +146,7 @@ fn with_cones(config: &Config, strategy: ConeStrategy, count: usize) -> Config {
     };
     Config {
         cones,
+        features: Default::default(),
         ..config.clone()
     }
 }
@@ -249,7 +251,8 @@ impl Task<'_> {
     }
 
     fn requests(&self, config: &Config) -> Result<Requests, BuildError> {
-        let mut all = cones::assign(self.repaired, &config.cones, &config.boundary)?;
+        let (cones, boundary) = (&config.cones, &config.boundary);
+        let mut all = cones::assign(self.repaired, cones, boundary, &config.features)?;
         Ok(all.swap_remove(self.index))
     }
 
