@@ -73,7 +73,7 @@ pub fn prescribe(
     let mut from_field = None;
     let chosen = match (cones.strategy, requests.cones.is_empty()) {
         (ConeStrategy::Field, _) => {
-            let (chosen, found) = field::select(mesh, features, &requests.features)?;
+            let (chosen, found) = field::select(mesh, features, &requests.features, cones.count)?;
             from_field = Some(Box::new(found));
             chosen
         }

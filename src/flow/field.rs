@@ -17,7 +17,9 @@ mod quarters;
 mod smoothest;
 #[cfg(test)]
 mod tests;
+mod ways;
 
+pub use quarters::{GridCones, Moved};
 pub use smoothest::cross_field;
 
 use crate::flow::holonomy::HolonomyError;
@@ -69,6 +71,16 @@ pub enum FieldError {
         of: usize,
         /// What is left, radians.
         residual: f64,
+    },
+    /// There is no more to merge.
+    #[error(
+        "the field has {left} cones that cannot be merged, as a grid has none of fewer than three quads, but at most {most} are asked for: raise cones.count"
+    )]
+    TooManyCones {
+        /// Number of cones inside.
+        left: usize,
+        /// Most that are asked for.
+        most: usize,
     },
     /// There are not enough vertices to spread the curvature over.
     #[error(

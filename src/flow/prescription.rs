@@ -4,7 +4,7 @@
 //! [`super::cones`].
 
 use crate::flow::features::Feature;
-use crate::flow::field::CrossField;
+use crate::flow::field::{CrossField, Moved};
 use crate::flow::signature::Signature;
 use crate::geometry::ids::{HalfedgeId, VertexId, VertexVec};
 
@@ -62,8 +62,8 @@ pub struct FromField {
     pub field: CrossField,
     /// Its cone angles and turnings there.
     pub signature: Signature,
-    /// Number of quarter turns that were moved from vertex to vertex so that a grid can have the cones.
-    pub adjusted: usize,
+    /// Quarter turns that were moved from vertex to vertex so that a grid can have the cones.
+    pub moved: Moved,
 }
 
 impl Prescription {

@@ -182,6 +182,8 @@ pub struct Holonomy {
     pub conformality: f64,
     /// Number of quarter turns that were moved between vertices so that a grid can have the cones of the field.
     pub adjusted: usize,
+    /// Number of quarter turns that were moved between cones of the field, of which one is gone.
+    pub merged: usize,
 }
 
 /// An independent loop.

@@ -132,7 +132,8 @@ fn metric(atlas: &AffineAtlas) -> Metric {
                 .map(|&(turns, residual)| Loop { turns, residual })
                 .collect(),
             conformality: atlas.flow.conformality,
-            adjusted: met.adjusted,
+            adjusted: met.moved.to_least,
+            merged: met.moved.merged,
         }),
         history: history.clone(),
     }

@@ -1,13 +1,13 @@
 //! Cones where the smoothest cross field is singular: multiples of π/2 that follow the shape.
 //!
 //! *Enters:* a mesh, and which edges shall be lines. *Leaves:* cones and corners of the border, and what else the field says, so that a flow to quarter turns can follow it.
-//! *Guaranteed:* cones have at least three quarter turns, corners of the border and sectors between features at least one, as in a grid of quads. *Not guaranteed:* few cones: there are as many
-//! as the shape asks for.
+//! *Guaranteed:* cones have at least three quarter turns, corners of the border and sectors between features at least one, as in a grid of quads; no more cones inside than were
+//! asked for. *Not guaranteed:* few cones where no number is: there are as many as the shape asks for.
 
 use super::error::ConeError;
 use super::request::RequestedCone;
 use crate::flow::features::{Feature, FeatureParams, features};
-use crate::flow::field::{FieldError, cross_field};
+use crate::flow::field::{FieldError, GridCones, cross_field};
 use crate::flow::looped::LoopedSurface;
 use crate::flow::metric::face_lengths;
 use crate::flow::opened::Opened;
@@ -22,6 +22,10 @@ use std::f64::consts::FRAC_PI_2;
 /// Least angle of a cone, quarter turns: around a vertex of two quads these would share two edges.
 const LEAST_QUARTERS: i64 = 3;
 
+/// Distance at which cones of opposite curvature cancel each other, in square roots of the component's area: about a cell of a grid of ten
+/// thousand quads. Half of the cones of a scan go, and the deviation of the log scale grows by a tenth at most.
+const NEAR: f64 = 0.01;
+
 /// Part of the features, the least important ones, that are left out at a time where they are too many.
 const GIVEN_UP: usize = 8;
 
@@ -30,11 +34,12 @@ pub(super) fn select(
     mesh: &Mesh,
     params: &FeatureParams,
     named: &[EdgeId],
+    count: Option<usize>,
 ) -> Result<(Vec<RequestedCone>, FromField), ConeError> {
     let mut kept = features(mesh, params, named);
     let mut crowded = Vec::new();
     loop {
-        match along(mesh, &kept) {
+        match along(mesh, &kept, count) {
             // A piece between features that is too small for its corners: with fewer features it is larger.
             Err(ConeError::Field(FieldError::TooFewVertices { .. })) if !kept.is_empty() => {
                 crowded.extend(kept.split_off(kept.len() - kept.len().div_ceil(GIVEN_UP)));
@@ -51,7 +56,11 @@ pub(super) fn select(
     }
 }
 
-fn along(mesh: &Mesh, features: &[Feature]) -> Result<(Vec<RequestedCone>, FromField), ConeError> {
+fn along(
+    mesh: &Mesh,
+    features: &[Feature],
+    count: Option<usize>,
+) -> Result<(Vec<RequestedCone>, FromField), ConeError> {
     let c = &mesh.connectivity;
     let source_length: EdgeVec<f64> = c.edges().map(|e| mesh.edge_length(e)).collect();
     let edges: Vec<EdgeId> = features.iter().flat_map(|f| &f.edges).copied().collect();
@@ -66,7 +75,12 @@ fn along(mesh: &Mesh, features: &[Feature]) -> Result<(Vec<RequestedCone>, FromF
     let area = own.faces().map(|f| triangle::area(sides(f)).unwrap_or(0.0));
     let area: FaceVec<f64> = area.collect();
     let mut field = cross_field(own, &angle, &area)?;
-    let (signature, adjusted) = field.grid_signature(&surface, &angle, LEAST_QUARTERS)?;
+    let asked = GridCones {
+        least: LEAST_QUARTERS,
+        near: NEAR * area.iter().sum::<f64>().sqrt(),
+        most: count.unwrap_or(usize::MAX),
+    };
+    let (signature, moved) = field.grid_signature(&surface, &angle, &asked)?;
     let flat = |v: VertexId| match c.is_boundary_vertex(v) {
         true => FULL_TURN / 2,
         false => FULL_TURN,
@@ -108,7 +122,7 @@ fn along(mesh: &Mesh, features: &[Feature]) -> Result<(Vec<RequestedCone>, FromF
         crowded: Vec::new(),
         field,
         signature,
-        adjusted,
+        moved,
     };
     Ok((cones, found))
 }

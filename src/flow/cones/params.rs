@@ -48,7 +48,7 @@ pub struct ConeParams {
     pub strategy: ConeStrategy,
     /// Cones by name; not empty means strategy `listed`.
     pub list: Vec<ConeSpec>,
-    /// Number of cones for `spread`, at least 1; the most that `auto` places in the interior. Absent: 8, and for `auto` as many as the
+    /// Number of cones for `spread`, at least 1; the most that `auto` and `field` place in the interior. Absent: 8, and for `auto` and `field` as many as the
     /// surface needs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub count: Option<usize>,

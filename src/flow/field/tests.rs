@@ -158,15 +158,20 @@ fn sharp_cones_are_given_quarter_turns() {
     let before = field.signature(&x.looped(), &x.angle).unwrap();
     let lacking: i64 = before.cone.iter().map(|k| (3 - k).max(0)).sum();
     assert!(lacking > 0, "the spikes are no sharp cones");
-    let (signature, moved) = field.grid_signature(&x.looped(), &x.angle, 3).unwrap();
-    assert_eq!(moved as i64, lacking);
+    let (signature, moved) = field
+        .grid_signature(&x.looped(), &x.angle, &GridCones::at_least(3))
+        .unwrap();
+    assert_eq!(moved.to_least as i64, lacking);
     assert!(signature.cone.iter().all(|&k| k >= 3));
     signature.check(&x.c, &x.loops).unwrap();
     // The changed field is a field still.
     assert_eq!(field.signature(&x.looped(), &x.angle).unwrap(), signature);
     let mut again = cross_field(&x.c, &x.angle, &x.area).unwrap();
     assert_eq!(
-        again.grid_signature(&x.looped(), &x.angle, 3).unwrap().0,
+        again
+            .grid_signature(&x.looped(), &x.angle, &GridCones::at_least(3))
+            .unwrap()
+            .0,
         signature
     );
 }
@@ -182,7 +187,9 @@ fn four_vertices_are_too_few_for_a_grid() {
     let faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]];
     let x = prepare(&Shape::new("tetrahedron", &faces, &positions));
     let mut field = cross_field(&x.c, &x.angle, &x.area).unwrap();
-    let error = field.grid_signature(&x.looped(), &x.angle, 3).unwrap_err();
+    let error = field
+        .grid_signature(&x.looped(), &x.angle, &GridCones::at_least(3))
+        .unwrap_err();
     assert_eq!(
         error,
         FieldError::TooFewVertices {
@@ -190,5 +197,92 @@ fn four_vertices_are_too_few_for_a_grid() {
             least: 3
         }
     );
-    assert!(field.grid_signature(&x.looped(), &x.angle, 1).is_ok());
+    assert!(
+        field
+            .grid_signature(&x.looped(), &x.angle, &GridCones::at_least(1))
+            .is_ok()
+    );
+}
+
+/// Distances along edges from a vertex to all others, by relaxing until nothing changes.
+fn distances(x: &Fielded, from: VertexId) -> VertexVec<f64> {
+    let mut distance = VertexVec::filled(f64::INFINITY, x.c.vertex_count());
+    distance[from] = 0.0;
+    loop {
+        let before = distance.clone();
+        for e in x.c.edges() {
+            let [a, b] = x.c.edge_vertices(e);
+            distance[a] = distance[a].min(distance[b] + x.length[e]);
+            distance[b] = distance[b].min(distance[a] + x.length[e]);
+        }
+        if before == distance {
+            return distance;
+        }
+    }
+}
+
+#[test]
+fn near_cones_of_opposite_curvature_cancel() {
+    let mut merged = 0;
+    for shape in [spiky(), shapes::plate(2, 3), shapes::plate(3, 2)] {
+        let x = prepare(&shape);
+        let start = cross_field(&x.c, &x.angle, &x.area).unwrap();
+        for near in [0.1, 0.3, 0.6].map(|part| part * x.area.iter().sum::<f64>().sqrt()) {
+            let mut field = start.clone();
+            let asked = GridCones {
+                near,
+                ..GridCones::at_least(3)
+            };
+            let (signature, moved) = field.grid_signature(&x.looped(), &x.angle, &asked).unwrap();
+            merged += moved.merged;
+            assert_eq!(field.signature(&x.looped(), &x.angle).unwrap(), signature);
+            let kind = |v: VertexId| (signature.cone[v] - FULL_TURN).signum();
+            for v in x.c.vertices().filter(|&v| kind(v) > 0) {
+                let distance = distances(&x, v);
+                for w in x.c.vertices().filter(|&w| kind(w) < 0) {
+                    assert!(distance[w] > near, "{v} and {w} are {} apart", distance[w]);
+                }
+            }
+        }
+    }
+    assert!(merged > 10, "only {merged} quarter turns were moved");
+}
+
+#[test]
+fn cones_are_as_few_as_asked() {
+    // Bounds of the grid: eight cones of three quads on a sphere; one on a surface of more handles than one.
+    for (shape, fewest) in [
+        (spiky(), 8),
+        (shapes::plate(2, 3), 1),
+        (shapes::plate(3, 2), 1),
+    ] {
+        let x = prepare(&shape);
+        let start = cross_field(&x.c, &x.angle, &x.area).unwrap();
+        let inside = |s: &Signature| s.cone.iter().filter(|&&k| k != FULL_TURN).count();
+        let free = inside(&start.signature(&x.looped(), &x.angle).unwrap());
+        for most in [free, (free + fewest) / 2, fewest] {
+            let mut field = start.clone();
+            let asked = GridCones {
+                most,
+                ..GridCones::at_least(3)
+            };
+            let (signature, _) = field.grid_signature(&x.looped(), &x.angle, &asked).unwrap();
+            assert!(
+                inside(&signature) <= most,
+                "{} of {most}",
+                inside(&signature)
+            );
+            assert!(signature.cone.iter().all(|&k| k >= 3));
+            assert_eq!(field.signature(&x.looped(), &x.angle).unwrap(), signature);
+        }
+        if fewest > 1 {
+            let asked = GridCones {
+                most: fewest - 1,
+                ..GridCones::at_least(3)
+            };
+            let error = (start.clone().grid_signature(&x.looped(), &x.angle, &asked)).unwrap_err();
+            let (left, most) = (fewest, fewest - 1);
+            assert_eq!(error, FieldError::TooManyCones { left, most });
+        }
+    }
 }

@@ -107,7 +107,7 @@ pub(super) fn flow(
             features.into_iter().map(|(f, _)| f.clone()).collect()
         };
         let met = QuarterTurns {
-            adjusted: from.adjusted,
+            moved: from.moved,
             lines: cloned(lines),
             given_up: [cloned(others), from.crowded.clone()].concat(),
             ..QuarterTurns::default()

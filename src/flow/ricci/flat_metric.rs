@@ -1,6 +1,7 @@
 //! What the flow yields.
 
 use crate::flow::features::Feature;
+use crate::flow::field::Moved;
 use crate::flow::intrinsic::Intrinsic;
 use crate::flow::opened::Opened;
 use crate::flow::packing::PackingFit;
@@ -14,8 +15,8 @@ pub struct QuarterTurns {
     pub loops: Vec<(i64, f64)>,
     /// Root of the mean square and maximum of λ* − λ⁰ − (u_i + u_j) over the edges of B: 0 where the metric is conformal.
     pub conformal_error: [f64; 2],
-    /// Number of quarter turns that were moved from vertex to vertex so that a grid can have the cones of the field.
-    pub adjusted: usize,
+    /// Quarter turns that were moved from vertex to vertex so that a grid can have the cones of the field.
+    pub moved: Moved,
     /// The features that are straight lines.
     pub lines: Vec<Feature>,
     /// Those that could not be.

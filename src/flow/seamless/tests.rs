@@ -4,7 +4,7 @@ use super::norm::Norm;
 use super::state::Problem;
 use super::*;
 use crate::flow::delaunay::Delaunay;
-use crate::flow::field::{CrossField, cross_field};
+use crate::flow::field::{CrossField, GridCones, cross_field};
 use crate::flow::holonomy::homology_basis;
 use crate::flow::looped::LoopedSurface;
 use crate::flow::metric::face_lengths;
@@ -45,7 +45,10 @@ fn field_of(on: &LoopedSurface) -> (CrossField, FaceVec<[f64; 3]>) {
 /// The signature of that field that a grid can have.
 fn signature(on: &LoopedSurface) -> Signature {
     let (mut field, angle) = field_of(on);
-    field.grid_signature(on, &angle, 3).unwrap().0
+    field
+        .grid_signature(on, &angle, &GridCones::at_least(3))
+        .unwrap()
+        .0
 }
 
 fn prepare(shape: &Shape) -> Prepared {

@@ -32,10 +32,17 @@ pub(super) fn describe(met: &QuarterTurns, mesh: &Mesh) -> Vec<String> {
         0.5 * rms,
         0.5 * most
     ));
-    if met.adjusted > 0 {
+    let turns = |count| counted(count, "quarter turn was", "quarter turns were");
+    if met.moved.to_least > 0 {
         lines.push(format!(
             "{} moved between vertices, so that a grid can have the cones of the field",
-            counted(met.adjusted, "quarter turn was", "quarter turns were")
+            turns(met.moved.to_least)
+        ));
+    }
+    if met.moved.merged > 0 {
+        lines.push(format!(
+            "{} moved between cones of the field that were near each other or more than cones.count, so that one of two is gone",
+            turns(met.moved.merged)
         ));
     }
     let all = met.lines.len() + met.given_up.len();

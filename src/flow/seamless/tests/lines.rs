@@ -194,7 +194,9 @@ fn a_field_stays_where_features_are_glued_again() {
     let cut = Cut::new(shape, &edges);
     let on = cut.looped();
     let (mut field, angle) = field_of(&on);
-    let (apart, _) = field.grid_signature(&on, &angle, 3).unwrap();
+    let (apart, _) = field
+        .grid_signature(&on, &angle, &GridCones::at_least(3))
+        .unwrap();
     let own = on.own();
     let own_side = |e: EdgeId| {
         let h = on.connectivity.edge_halfedge(e);
