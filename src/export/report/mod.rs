@@ -238,6 +238,7 @@ fn views(body: &mut String, drawing: &Drawing) {
     body.push_str("<h2>Surface</h2>\n<form id=\"layers\" aria-label=\"What is shown\"><fieldset><legend>Colours</legend>\n");
     let layers = [
         ("board", "Checkerboard"),
+        ("field", "Directions"),
         ("log-scale", "Log scale"),
         ("angle-error", "Angle error"),
         ("distance", "Distance of the images"),
@@ -258,9 +259,13 @@ fn views(body: &mut String, drawing: &Drawing) {
     for (name, words, state) in [
         ("cones", "Cones", " checked"),
         ("cut", "Cut", " checked"),
+        ("features", "Features", " checked"),
         ("borders", "Borders of patches", ""),
         ("edges", "Edges of faces", ""),
     ] {
+        if name == "features" && !drawing.has_features {
+            continue;
+        }
         let _ = writeln!(
             body,
             "<label><input type=\"checkbox\" name=\"{name}\"{state}>{words}</label>"
@@ -290,6 +295,7 @@ fn views(body: &mut String, drawing: &Drawing) {
         <li><svg width=\"16\" height=\"16\" aria-hidden=\"true\"><path d=\"M8 2L15 14H1Z\" fill=\"var(--positive)\"/></svg>cone of positive curvature</li>\
         <li><svg width=\"16\" height=\"16\" aria-hidden=\"true\"><path d=\"M8 1L15 8L8 15L1 8Z\" fill=\"var(--negative)\"/></svg>cone of negative curvature</li>\
         <li><svg width=\"28\" height=\"10\" aria-hidden=\"true\"><path d=\"M0 5H28\" stroke=\"var(--halo)\" stroke-width=\"6\"/><path d=\"M0 5H28\" stroke=\"var(--cut)\" stroke-width=\"3\"/></svg>cut</li>\
+        <li><svg width=\"28\" height=\"10\" aria-hidden=\"true\"><path d=\"M0 5H28\" stroke=\"var(--halo)\" stroke-width=\"6\"/><path d=\"M0 5H28\" stroke=\"var(--feature)\" stroke-width=\"3\"/></svg>feature that is a line</li>\
         <li><svg width=\"28\" height=\"10\" aria-hidden=\"true\"><path d=\"M0 5H28\" stroke=\"var(--ink)\" stroke-width=\"3\"/></svg>boundary</li>\
         <li><svg width=\"28\" height=\"10\" aria-hidden=\"true\"><path d=\"M0 5H28\" stroke=\"var(--border-line)\" stroke-width=\"1.5\"/></svg>border of patches</li></ul>\n");
 }
@@ -307,7 +313,8 @@ fn legends(body: &mut String, scales: &Scales) {
     let rising: Vec<String> = RISING.iter().map(|&c| rgb(c)).collect();
     let [middle, reach] = scales.log_scale;
     let far = scales.distance.unwrap_or(0.0);
-    body.push_str("<div class=\"legends\">\n<div class=\"legend\" data-legend=\"board\"><span class=\"words\">Squares are squares of the flat metric; where they would be too small or too large to see, sizes change by powers of two.</span></div>\n");
+    body.push_str("<div class=\"legends\">\n<div class=\"legend\" data-legend=\"board\"><span class=\"words\">Squares are squares of the flat metric; where they would be too small or too large to see, sizes change by powers of two.</span></div>\n\
+        <div class=\"legend\" data-legend=\"field\" hidden><span class=\"words\">Lines along both axes of the flat metric. Where all transitions turn by quarter turns they go on across the cut: a cross field, whose singular points are the cones.</span></div>\n");
     let mut bar = |layer: &str, words: &str, colours: &[String], ends: [f64; 3]| {
         let [low, mid, high] = ends.map(figure);
         let _ = writeln!(

@@ -1,7 +1,7 @@
 // The two views of the page and their controls.
 "use strict";
 
-const LAYERS = ["board", "log-scale", "angle-error", "distance", "patches"];
+const LAYERS = ["board", "log-scale", "angle-error", "distance", "patches", "field"];
 
 // Column-major matrices.
 const multiply = (a, b) => {
@@ -47,6 +47,7 @@ function palette() {
     ink: solid("--ink"),
     halo: solid("--halo"),
     cut: solid("--cut"),
+    feature: solid("--feature"),
     positive: inkOf("--positive"),
     negative: inkOf("--negative"),
   };
@@ -220,11 +221,13 @@ class Page {
   }
 
   chosen() {
-    const on = (name) => this.form.elements[name].checked;
+    // What a surface does not have has no box.
+    const on = (name) => Boolean(this.form.elements[name]?.checked);
     return {
       layer: LAYERS.indexOf(this.form.elements.layer.value),
       cones: on("cones"),
       cut: on("cut"),
+      features: on("features"),
       borders: on("borders"),
       edges: on("edges"),
     };

@@ -102,6 +102,11 @@ uniform vec2 cellRange;
 uniform vec3 low[7];
 uniform vec3 rising[5];
 out vec4 colour;
+// Lines along both directions; their width is the same at any size.
+float line(vec2 at) {
+  vec2 away = abs(fract(at - 0.5) - 0.5) / max(fwidth(at), vec2(1e-6));
+  return 1.0 - smoothstep(0.4, 1.5, min(away.x, away.y));
+}
 float dark(vec2 at) {
   vec2 q = floor(at);
   return mod(q.x + q.y, 2.0);
@@ -124,16 +129,22 @@ void main() {
   }
   vec3 c = vec3(0.8);
   float hatch = step(6.0, mod(gl_FragCoord.x + gl_FragCoord.y, 9.0));
-  if (layer == 0) {
+  if (layer == 0 || layer == 5) {
     // Cells that got too large or too small are cut and joined by powers of two, one fading into the next.
     float excess = cells.z - clamp(cells.z, cellRange.x, cellRange.y);
     float s = floor(excess);
     float fade = clamp((excess - s - 0.47) / 0.06, 0.0, 1.0);
     vec2 at = cells.xy * exp2(s);
-    float d = mix(dark(at), dark(2.0 * at), fade);
     float pixels = 1.0 / max(length(fwidth(at)), 1e-6);
-    d = 0.5 + (d - 0.5) * clamp((pixels - 1.0) / 2.0, 0.0, 1.0);
-    c = mix(vec3(0.92, 0.90, 0.85), vec3(0.27, 0.45, 0.52), d);
+    if (layer == 0) {
+      float d = mix(dark(at), dark(2.0 * at), fade);
+      d = 0.5 + (d - 0.5) * clamp((pixels - 1.0) / 2.0, 0.0, 1.0);
+      c = mix(vec3(0.92, 0.90, 0.85), vec3(0.27, 0.45, 0.52), d);
+    } else {
+      float d = mix(line(at), line(2.0 * at), fade);
+      d = mix(0.4, d, clamp((pixels - 2.0) / 3.0, 0.0, 1.0));
+      c = mix(vec3(0.93, 0.91, 0.87), vec3(0.13, 0.30, 0.38), d);
+    }
   } else if (layer == 1) {
     c = along(shown.x);
     // Hatched where the flat metric shrinks the surface.
@@ -246,7 +257,7 @@ function program(gl, vertex, fragment) {
   return { made, uniforms };
 }
 
-const LINE_KINDS = ["border", "boundary", "cut"];
+const LINE_KINDS = ["border", "boundary", "cut", "feature"];
 const SPACES = ["space", "chart", "packed"];
 
 class Surface {
@@ -471,6 +482,8 @@ class Surface {
     const layers = [
       [0, view.borders, 0.6, palette.border],
       [1, true, 1.3, palette.ink],
+      [3, view.features, 2.6, palette.halo],
+      [3, view.features, 1.5, palette.feature],
       [2, view.cut, 2.6, palette.halo],
       [2, view.cut, 1.5, palette.cut],
     ];

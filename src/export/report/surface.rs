@@ -9,12 +9,13 @@
 use super::pack::Archive;
 use crate::export::pictures::checkerboard::{CELL_RANGE, Checkerboard, excess, weighted_quantile};
 use crate::export::pictures::colour::{categorical, diverging};
-use crate::geometry::ids::{FaceId, FaceVec, NONE};
+use crate::geometry::ids::{FaceId, FaceVec, NONE, VertexId};
 use crate::geometry::mesh::{bounding_box, cross, norm, sub};
 use crate::product::AffineAtlas;
 use crate::report::FaceDistortion;
 use rustc_hash::FxHashMap;
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 use std::io;
 
 /// What is not negative, pale to dark.
@@ -37,6 +38,8 @@ pub(super) struct Drawing {
     pub data: String,
     /// What the scales of colours mean.
     pub scales: Scales,
+    /// Whether features are lines.
+    pub has_features: bool,
 }
 
 /// The ends of the scales of colours.
@@ -60,7 +63,7 @@ pub(super) fn draw(
     let (level, board) = board(atlas);
     archive.integers("level", &quantised(&level.values, level.range, 65_535.0));
     let chart = plane(atlas, &board, &mut archive);
-    lines(atlas, &mut archive);
+    let has_features = lines(atlas, &mut archive);
     normals(atlas, &mut archive);
     let rows: Vec<[u32; 1]> = atlas.mesh.source_face.iter().map(|&f| [f]).collect();
     archive.integers("source_face", &rows);
@@ -96,7 +99,12 @@ pub(super) fn draw(
         "patches": (0..atlas.patches.patches.len()).map(categorical).collect::<Vec<_>>(),
         "cones": cones,
     });
-    Ok(Drawing { meta, data, scales })
+    Ok(Drawing {
+        meta,
+        data,
+        scales,
+        has_features,
+    })
 }
 
 /// Values and the least and greatest of them.
@@ -233,13 +241,25 @@ fn plane(
     (low, high)
 }
 
-/// Sides of faces that are drawn as lines, by kind: 0 between patches, 1 the surface's boundary, 2 the cut.
-fn lines(atlas: &AffineAtlas, archive: &mut Archive) {
+/// Sides of faces that are drawn as lines, by kind: 0 between patches, 1 the surface's boundary, 2 the cut, 3 features. Tells whether there are any of
+/// these.
+fn lines(atlas: &AffineAtlas, archive: &mut Archive) -> bool {
     let c = &atlas.mesh.connectivity;
     let patch = &atlas.patches.face_patch;
     let mut lines: Vec<[u32; 3]> = Vec::new();
+    let met = atlas.metric.quarter_turns.as_ref();
+    let features = met.into_iter().flat_map(|met| &met.lines);
+    let feature_edges: BTreeSet<[VertexId; 2]> = features
+        .flat_map(|feature| feature.vertices.windows(2))
+        .map(|pair| [pair[0].min(pair[1]), pair[0].max(pair[1])])
+        .collect();
     for (number, h) in (0u32..).zip(c.halfedges()) {
         let segment = atlas.cut.segment[c.edge(h)];
+        let mut ends = [c.tail(h), c.head(h)];
+        ends.sort_unstable();
+        if feature_edges.contains(&ends) {
+            lines.push([3, number, 0]);
+        }
         let across = c.twin(h).map(|t| c.face(t));
         let kind = match across {
             None => 1,
@@ -255,6 +275,7 @@ fn lines(atlas: &AffineAtlas, archive: &mut Archive) {
     archive.integers("line_kind", &column(0));
     archive.integers("line_corner", &column(1));
     archive.integers("line_segment", &column(2));
+    !feature_edges.is_empty()
 }
 
 /// Normals of vertices and faces. Those of faces are those of the face in the file, because the parts that the overlay cuts it
