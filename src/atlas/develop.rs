@@ -13,7 +13,7 @@
 
 use crate::atlas::cut::{CutGraph, slit_copies};
 use crate::atlas::overlay::Layout;
-use crate::atlas::plane::{distance, wrap_angle};
+use crate::atlas::plane::{distance, rotation, wrap_angle};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, HalfedgeId, HalfedgeVec};
 use crate::geometry::triangle::angles;
@@ -37,6 +37,17 @@ pub struct Unfolded {
     pub copies: usize,
     /// Largest mismatch that was left when the disk was closed up, source units.
     pub closing_error: f64,
+}
+
+impl Unfolded {
+    /// Turns the plane about the origin, radians.
+    pub fn turn(&mut self, angle: f64) {
+        let turn = rotation(angle);
+        let corners = self.uv.as_mut_slice().iter_mut().flatten();
+        corners.for_each(|p| *p = turn(*p));
+        let directions = self.direction.as_mut_slice().iter_mut();
+        directions.for_each(|d| *d = wrap_angle(*d + angle));
+    }
 }
 
 /// The central chart.
@@ -80,6 +91,13 @@ impl Development {
             copies,
             closing_error: unfolded.closing_error,
         }
+    }
+
+    /// Turns the chart about the origin, radians.
+    pub fn turn(&mut self, angle: f64) {
+        let turn = rotation(angle);
+        let corners = self.uv.as_mut_slice().iter_mut().flatten();
+        corners.for_each(|p| *p = turn(*p));
     }
 
     /// A chart made up for a test.

@@ -377,6 +377,15 @@ pub const KEYS: &[Key] = &[
         "",
         "0",
     ),
+    key(
+        "features.curvature",
+        Kind::Number {
+            min: 0.0,
+            max: 100.0,
+        },
+        "",
+        "0.003",
+    ),
     key("connectivity.enabled", Kind::Bool, "", "absent"),
     key(
         "connectivity.rings",

@@ -17,7 +17,7 @@ pub const LEAST_EDGES: usize = 5;
 /// Sine of the angle at a corner below which a face has no direction.
 const FLAT: f64 = 1e-6;
 
-/// Which edges shall become lines; for cones of a cross field and quarter turns only.
+/// What a cross field follows and which edges shall become lines; for cones of a field and quarter turns only.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FeatureParams {
@@ -32,6 +32,8 @@ pub struct FeatureParams {
     pub file: Option<PathBuf>,
     /// Number of the first vertex in `file`: 0 or 1.
     pub file_first_vertex: u32,
+    /// Weight of principal curvature beside smoothness.
+    pub curvature: f64,
 }
 
 impl Default for FeatureParams {
@@ -42,6 +44,7 @@ impl Default for FeatureParams {
             list: Vec::new(),
             file: None,
             file_first_vertex: 0,
+            curvature: 0.003,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Surfaces: ids, connectivity, positions, and formulas on single triangles and polygons.
 pub mod connectivity;
+pub mod curvature;
 pub mod deviation;
 pub(crate) mod disjoint_sets;
 pub mod frame;

@@ -29,7 +29,7 @@ use crate::atlas::develop::Development;
 use crate::atlas::geometry_image::SourceSurface;
 use crate::atlas::patches::Domain;
 use crate::atlas::rectangles::Charted;
-use crate::atlas::{charts, develop, geometry_image, patches, rectangles};
+use crate::atlas::{axes, charts, develop, geometry_image, patches, rectangles};
 use crate::config::Config;
 use crate::export::folder::list_files;
 use crate::flow::cones::{self, Requests};
@@ -149,8 +149,13 @@ fn build_component(
     } = flatten(mesh, prescription, config, observer, &enter)?;
     let c = &mesh.connectivity;
     enter("charts")?;
-    let unfolded = develop::develop(&layout, layout_cut)?;
-    let central = Development::place(c, &cut, &layout, &unfolded);
+    let mut unfolded = develop::develop(&layout, layout_cut)?;
+    let mut central = Development::place(c, &cut, &layout, &unfolded);
+    if let Some(met) = &metric.quarter_turns {
+        let axis = axes::axis(&mesh, &cut, &central, &met.lines);
+        unfolded.turn(-axis);
+        central.turn(-axis);
+    }
     let charts = charts::chart(c, &cut, &central, &layout, &unfolded, &prescription)?;
     enter("patches")?;
     let under = Some((&layout, &unfolded));

@@ -1,7 +1,7 @@
 //! Sharp edges as lines of the atlas, on a part with junctions of three and four of them.
 
 use crate::command::{build_small, document, verify};
-use crate::real_models::lines::lines;
+use crate::real_models::lines::{array, lines};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -150,4 +150,71 @@ fn edges_of_a_file_are_lines() {
         message.contains("features.list and cones.strategy = \"auto\" exclude"),
         "{message}"
     );
+}
+
+/// A torus whose edges are oblique to its circles.
+fn torus() -> String {
+    let (around, across) = (36, 18);
+    let mut text = String::new();
+    for i in 0..around {
+        for j in 0..across {
+            let [a, b] = [i as f64 / f64::from(around), j as f64 / f64::from(across)];
+            // Rows are sheared by five columns on the way round.
+            let b = b + 5.0 * a / f64::from(across);
+            let [u, v] = [a, b].map(|x| x * std::f64::consts::TAU);
+            let r = 2.0 + 0.7 * v.cos();
+            writeln!(text, "v {} {} {}", r * u.cos(), r * u.sin(), 0.7 * v.sin()).unwrap();
+        }
+    }
+    let at = |i: i32, j: i32| {
+        let j = if i == around { j + 5 } else { j };
+        (i % around) * across + j.rem_euclid(across) + 1
+    };
+    for i in 0..around {
+        for j in 0..across {
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            writeln!(text, "f {a} {b} {c}\nf {a} {c} {d}").unwrap();
+        }
+    }
+    text
+}
+
+/// Without lines the axes follow the directions of principal curvature: on a torus its circles.
+#[test]
+fn axes_follow_the_circles_of_a_torus() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mesh = folder.path().join("torus.obj");
+    std::fs::write(&mesh, torus()).expect("writable");
+    let built = build_small(&mesh, &SEAMLESS);
+    assert_eq!(built.code(), Some(0), "{}", built.message());
+    let atlas = built.atlas();
+    verify(&atlas);
+    let positions: Vec<f64> = array(&atlas, "positions");
+    let faces: Vec<u32> = array(&atlas, "faces");
+    let uv: Vec<f64> = array(&atlas, "central_uv");
+    let mut sum = [0.0; 2];
+    for (f, corners) in faces.chunks_exact(3).enumerate() {
+        let p = |k: usize| {
+            let at = 3 * corners[k] as usize;
+            [positions[at], positions[at + 1], positions[at + 2]]
+        };
+        let q = |k: usize| [uv[6 * f + 2 * k], uv[6 * f + 2 * k + 1]];
+        let [e, g] = [1, 2].map(|k| [0, 1, 2].map(|i| p(k)[i] - p(0)[i]));
+        let [s, t] = [1, 2].map(|k| [0, 1].map(|i| q(k)[i] - q(0)[i]));
+        // Along the large circle, as a e + b g.
+        let circle = [-p(0)[1], p(0)[0], 0.0];
+        let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+        let det = dot(e, e) * dot(g, g) - dot(e, g).powi(2);
+        let a = (dot(circle, e) * dot(g, g) - dot(circle, g) * dot(e, g)) / det;
+        let b = (dot(circle, g) * dot(e, e) - dot(circle, e) * dot(e, g)) / det;
+        let angle = 4.0 * (a * s[1] + b * t[1]).atan2(a * s[0] + b * t[0]);
+        let area = 0.5 * det.sqrt();
+        sum[0] += area * angle.cos();
+        sum[1] += area * angle.sin();
+    }
+    let (off, order) = (sum[1].atan2(sum[0]) / 4.0, sum[0].hypot(sum[1]));
+    let area: f64 = 4.0 * std::f64::consts::PI.powi(2) * 2.0 * 0.7;
+    // Lengths are free at τ = 0, so directions spread a little.
+    assert!(order > 0.9 * area, "{order} of {area}");
+    assert!(off.abs() < 0.01, "{off} rad");
 }

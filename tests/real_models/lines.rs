@@ -19,7 +19,7 @@ pub struct Lines {
     /// Number of chains of sharp edges, and their length.
     pub chains: usize,
     pub length: f64,
-    /// Length of the edges that are parallel to an axis on both sides.
+    /// Length of the edges that are parallel to an axis of the central chart on both sides.
     pub on_lines: f64,
     /// Vertices where three, four or more chains meet.
     pub junctions: BTreeMap<usize, usize>,
@@ -38,7 +38,7 @@ impl Lines {
     }
 }
 
-fn array<T: npyz::Deserialize>(atlas: &Path, name: &str) -> Vec<T> {
+pub fn array<T: npyz::Deserialize>(atlas: &Path, name: &str) -> Vec<T> {
     let file = std::fs::File::open(atlas.join("atlas.npz")).expect("atlas.npz");
     let mut archive = zip::ZipArchive::new(file).expect("a zip file");
     let mut bytes = Vec::new();
@@ -130,7 +130,6 @@ pub fn lines(atlas: &Path) -> Lines {
     }
     ends.values()
         .for_each(|n| *found.junctions.entry(*n).or_default() += 1);
-    // The axes are those to which most is parallel.
     let length = |[a, b]: [u32; 2]| {
         let along = sub(positions[a as usize], positions[b as usize]);
         dot(along, along).sqrt()
@@ -139,17 +138,10 @@ pub fn lines(atlas: &Path) -> Lines {
     let directions: Vec<([f64; 2], f64)> = (edges.iter())
         .map(|e| (sharp[e].map(direction), length(*e)))
         .collect();
-    let on_axis = |axis: f64| -> f64 {
-        let is_along = |d: &[f64; 2]| d.iter().all(|x| quarter(x - axis) < STRAIGHT);
-        directions
-            .iter()
-            .filter(|(d, _)| is_along(d))
-            .map(|(_, l)| l)
-            .sum()
-    };
+    let is_along = |d: &[f64; 2]| d.iter().all(|&x| quarter(x) < STRAIGHT);
     found.length = directions.iter().map(|(_, l)| l).sum();
-    let axes = directions.iter().step_by(1 + directions.len() / 50);
-    found.on_lines = axes.map(|(d, _)| on_axis(d[0])).fold(0.0, f64::max);
+    let along = directions.iter().filter(|(d, _)| is_along(d));
+    found.on_lines = along.map(|(_, l)| l).sum();
     let json = std::fs::read(atlas.join("atlas.json")).expect("atlas.json");
     let json: serde_json::Value = serde_json::from_slice(&json).expect("JSON");
     let features = json["features"].as_array().into_iter().flatten();

@@ -1,5 +1,7 @@
 //! Cones where the smoothest cross field is singular: multiples of π/2 that follow the shape.
 //!
+//! The field is drawn to the directions of principal curvature with the weight w (κ₁ − κ₂)² an area, so that it follows them over lengths of 1 / (κ₁ − κ₂) √w.
+//!
 //! *Enters:* a mesh, and which edges shall be lines. *Leaves:* cones and corners of the border, and what else the field says, so that a flow to quarter turns can follow it.
 //! *Guaranteed:* cones have at least three quarter turns, corners of the border and sectors between features at least one, as in a grid of quads; no more cones inside than were
 //! asked for. *Not guaranteed:* few cones where no number is: there are as many as the shape asks for.
@@ -14,6 +16,7 @@ use crate::flow::opened::Opened;
 use crate::flow::prescription::FromField;
 use crate::flow::signature::FULL_TURN;
 use crate::flow::surface_delaunay::SurfaceDelaunay;
+use crate::geometry::curvature;
 use crate::geometry::ids::{EdgeId, EdgeVec, FaceVec, HalfedgeId, VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
 use crate::geometry::triangle;
@@ -39,7 +42,7 @@ pub(super) fn select(
     let mut kept = features(mesh, params, named);
     let mut crowded = Vec::new();
     loop {
-        match along(mesh, &kept, count) {
+        match along(mesh, &kept, params, count) {
             // A piece between features that is too small for its corners: with fewer features it is larger.
             Err(ConeError::Field(FieldError::TooFewVertices { .. })) if !kept.is_empty() => {
                 crowded.extend(kept.split_off(kept.len() - kept.len().div_ceil(GIVEN_UP)));
@@ -59,6 +62,7 @@ pub(super) fn select(
 fn along(
     mesh: &Mesh,
     features: &[Feature],
+    params: &FeatureParams,
     count: Option<usize>,
 ) -> Result<(Vec<RequestedCone>, FromField), ConeError> {
     let c = &mesh.connectivity;
@@ -74,7 +78,14 @@ fn along(
     let angle = angle.ok_or(ConeError::FieldOnFlatFaces)?;
     let area = own.faces().map(|f| triangle::area(sides(f)).unwrap_or(0.0));
     let area: FaceVec<f64> = area.collect();
-    let mut field = cross_field(own, &angle, &area)?;
+    // Faces of the triangulation that was flipped, where their corners are in space.
+    let places = opened.vertex.iter().map(|&v| mesh.positions[v]);
+    let principal = curvature::principal(own, &places.collect());
+    let pull = principal
+        .enumerate()
+        .map(|(f, &[x, y])| [x * x - y * y, 2.0 * x * y].map(|p| params.curvature * area[f] * p));
+    let pull: FaceVec<[f64; 2]> = pull.collect();
+    let mut field = cross_field(own, &angle, &area, &pull)?;
     let asked = GridCones {
         least: LEAST_QUARTERS,
         near: NEAR * area.iter().sum::<f64>().sqrt(),

@@ -28,18 +28,20 @@ const MOST_STEPS: usize = 40;
 /// Steps of inverse iteration for the slowest way to fade, of which two digits are more than enough.
 const RATE_STEPS: usize = 6;
 
-/// The smoothest cross field of a surface, drawn to the border where it has one. `angle`: corner angles, radians; `area`: any unit.
+/// The smoothest cross field of a surface, drawn to the border where it has one. `angle`: corner angles, radians; `area`: any unit. `pull`: what draws every face to a
+/// cross of angle θ from its first halfedge, weight times e^{4iθ}; beside it an edge has the weight 1.
 pub fn cross_field(
     connectivity: &Connectivity,
     angle: &FaceVec<[f64; 3]>,
     area: &FaceVec<f64>,
+    pull: &FaceVec<[f64; 2]>,
 ) -> Result<CrossField, FieldError> {
     let c = connectivity;
     let rho = transport(c, angle);
-    let energy = Energy::new(c, &rho, area);
-    let root = match c.is_closed() {
-        true => energy.least_eigenvector()?,
-        false => energy.diffused()?,
+    let energy = Energy::new(c, &rho, area, pull);
+    let root = match energy.wanted > 0.0 {
+        true => energy.diffused()?,
+        false => energy.least_eigenvector()?,
     };
     let direction: FaceVec<f64> = c
         .faces()
@@ -67,22 +69,34 @@ struct Energy {
     pairs: Vec<[u32; 2]>,
     /// Entries of A, in the order of `pairs`.
     values: Vec<f64>,
-    /// b: what the border asks for.
+    /// b: what borders and pulls ask for.
     load: Vec<f64>,
-    /// Number of edges on the border.
-    borders: usize,
+    /// Total weight of what is asked for.
+    wanted: f64,
     /// Areas relative to their mean, one a part.
     mass: Vec<f64>,
 }
 
 impl Energy {
-    fn new(c: &Connectivity, rho: &HalfedgeVec<f64>, area: &FaceVec<f64>) -> Self {
+    fn new(
+        c: &Connectivity,
+        rho: &HalfedgeVec<f64>,
+        area: &FaceVec<f64>,
+        pull: &FaceVec<[f64; 2]>,
+    ) -> Self {
         let faces = c.face_count();
         let parts = |f: FaceId| [2 * f.index() as u32, 2 * f.index() as u32 + 1];
         let mut diagonal = vec![SHIFT; 2 * faces];
         let mut load = vec![0.0; 2 * faces];
         let (mut pairs, mut values) = (Vec::new(), Vec::new());
+        let mut wanted = c.edges().filter(|&e| c.is_boundary_edge(e)).count() as f64;
         for f in c.faces() {
+            let weight = pull[f][0].hypot(pull[f][1]);
+            wanted += weight;
+            for (part, pull) in parts(f).into_iter().zip(pull[f]) {
+                diagonal[part as usize] += weight;
+                load[part as usize] += pull;
+            }
             // The blocks on the diagonal are diagonal, but filled soon.
             pairs.push(parts(f));
             values.push(0.0);
@@ -115,9 +129,8 @@ impl Energy {
         }
         let total: f64 = area.iter().sum();
         let relative = area.iter().map(|a| a * faces as f64 / total);
-        let borders = c.edges().filter(|&e| c.is_boundary_edge(e)).count();
         Self {
-            borders,
+            wanted,
             diagonal,
             pairs,
             values,
@@ -169,7 +182,7 @@ impl Energy {
         Ok(x)
     }
 
-    /// Of a surface with a border.
+    /// Of a surface where something is asked for.
     fn diffused(&self) -> Result<Vec<f64>, FieldError> {
         let mut solver = self.solver()?;
         let mut x = self.load.clone();
@@ -209,10 +222,9 @@ impl Energy {
         let squares = self.diagonal.iter().zip(x).map(|(d, x)| d * x * x);
         let pairs = self.pairs.iter().zip(&self.values);
         let products = pairs.map(|(&[i, j], v)| 2.0 * v * x[i as usize] * x[j as usize]);
-        // Every border asks for a number of length 1.
-        let borders = self.load.iter().zip(x).map(|(b, x)| -2.0 * b * x);
-        let borders = borders.sum::<f64>() + self.borders as f64;
-        squares.sum::<f64>() + products.sum::<f64>() + borders
+        // What is asked for are numbers of length 1.
+        let asked = self.load.iter().zip(x).map(|(b, x)| -2.0 * b * x);
+        squares.sum::<f64>() + products.sum::<f64>() + asked.sum::<f64>() + self.wanted
     }
 }
 

@@ -38,7 +38,8 @@ fn field_of(on: &LoopedSurface) -> (CrossField, FaceVec<[f64; 3]>) {
         .map(|f| triangle::angles(sides(f)).unwrap())
         .collect();
     let area = own.faces().map(|f| triangle::area(sides(f)).unwrap());
-    let field = cross_field(own, &angle, &area.collect()).unwrap();
+    let pull = FaceVec::filled([0.0; 2], own.face_count());
+    let field = cross_field(own, &angle, &area.collect(), &pull).unwrap();
     (field, angle)
 }
 
