@@ -9,8 +9,7 @@ mod common;
 use affine_atlas::flow::cones::{self, BoundaryParams, ConeParams};
 use affine_atlas::flow::ricci;
 use affine_atlas::geometry::ids::EdgeVec;
-use affine_atlas::geometry::mesh::{Mesh, Soup};
-use affine_atlas::repair;
+use affine_atlas::geometry::mesh::Mesh;
 use common::{Arguments, Triangles, cpu_seconds};
 use std::error::Error;
 use std::time::Instant;
@@ -31,7 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             if level > 0 {
                 triangles.subdivide();
             }
-            let mesh = repaired(&triangles)?;
+            let mesh = triangles.mesh()?;
             for count in [None, Some(16)] {
                 let params = ConeParams {
                     count,
@@ -47,12 +46,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     Ok(())
-}
-
-fn repaired(triangles: &Triangles) -> Result<Mesh, Box<dyn Error>> {
-    let soup = Soup::from_triangles(triangles.positions.clone(), triangles.faces.clone());
-    let mut repaired = repair::repair(&soup, &Default::default())?;
-    Ok(repaired.components.swap_remove(0).mesh?)
 }
 
 /// CPU seconds and seconds of the clock.

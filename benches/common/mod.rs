@@ -3,6 +3,7 @@
 // Not every bench needs all of it.
 #![allow(dead_code)]
 
+use affine_atlas::geometry::mesh::{Mesh, Soup};
 use affine_atlas::{read, repair};
 use std::collections::HashMap;
 use std::error::Error;
@@ -61,6 +62,13 @@ impl Triangles {
             faces: mesh.connectivity.to_faces(),
             positions: mesh.positions.as_slice().to_vec(),
         })
+    }
+
+    /// The same as a mesh with names.
+    pub fn mesh(&self) -> Result<Mesh, Box<dyn Error>> {
+        let soup = Soup::from_triangles(self.positions.clone(), self.faces.clone());
+        let mut repaired = repair::repair(&soup, &Default::default())?;
+        Ok(repaired.components.swap_remove(0).mesh?)
     }
 
     /// Every face into four, new vertices at the middle of its edges and after the old ones; the surface stays.

@@ -6,7 +6,7 @@
 
 use super::{Arcs, COINCIDENT, Correspondence, CorrespondenceError, Crossing, Curves};
 use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{EdgeVec, HalfedgeId, HalfedgeVec, VertexVec};
+use crate::geometry::ids::{EdgeVec, HalfedgeId, NONE, VertexId, VertexVec};
 
 use CorrespondenceError::Inconsistent;
 
@@ -73,7 +73,13 @@ impl Correspondence {
         let total =
             u32::try_from(count).map_err(|_| CorrespondenceError::TooManyCrossings { count });
         let total = total? as usize;
-        let tracer = Tracer::new(self, base, current)?;
+        // What sets out elsewhere does not matter.
+        let mut ends: Vec<VertexId> = (runs.iter())
+            .flat_map(|&b| [base.tail(b), base.head(b)])
+            .collect();
+        ends.sort_unstable();
+        ends.dedup();
+        let tracer = Tracer::at(self, base, current, &ends)?;
         let follow = |&b: &HalfedgeId| {
             let mut crossing = Vec::new();
             let along = tracer.follow(b, total, &mut crossing)?;
@@ -90,9 +96,10 @@ pub(super) struct Tracer<'a> {
     /// Base halfedges around every vertex, in the order in which roundabouts count; `None` for the edge that closes the fan
     /// of a boundary vertex.
     around: Vec<Option<HalfedgeId>>,
-    /// Where a vertex begins in `around`.
-    first: VertexVec<usize>,
-    departure: HalfedgeVec<Option<Departure>>,
+    /// Where a vertex begins in `around`; [`NONE`] where nobody asked for it.
+    first: VertexVec<u32>,
+    /// How each of `around` sets out.
+    departure: Vec<Option<Departure>>,
 }
 
 impl<'a> Tracer<'a> {
@@ -101,16 +108,32 @@ impl<'a> Tracer<'a> {
         base: &'a Connectivity,
         current: &'a Connectivity,
     ) -> Result<Self, CorrespondenceError> {
+        Self::at(
+            integers,
+            base,
+            current,
+            &base.vertices().collect::<Vec<_>>(),
+        )
+    }
+
+    /// What is needed to follow base edges between some vertices.
+    fn at(
+        integers: &'a Correspondence,
+        base: &'a Connectivity,
+        current: &'a Connectivity,
+        vertices: &[VertexId],
+    ) -> Result<Self, CorrespondenceError> {
         if !integers.has_size_of(base) || !integers.has_size_of(current) {
             return Err(CorrespondenceError::OtherSize);
         }
-        let mut around = Vec::with_capacity(base.halfedge_count());
-        let mut first = VertexVec::default();
-        for v in base.vertices() {
-            let start = first.push(around.len());
+        let mut around = Vec::new();
+        let mut first = VertexVec::filled(NONE, base.vertex_count());
+        for &v in vertices {
+            let start = around.len();
+            first[v] = start as u32;
             around.extend(base.outgoing(v).map(Some));
             around.extend(base.is_boundary_vertex(v).then_some(None));
-            if around.len() - first[start] != integers.valence[v] as usize {
+            if around.len() - start != integers.valence[v] as usize {
                 return Err(Inconsistent("a base vertex has another number of edges"));
             }
         }
@@ -118,42 +141,55 @@ impl<'a> Tracer<'a> {
             integers,
             base,
             current,
+            departure: vec![None; around.len()],
             around,
             first,
-            departure: HalfedgeVec::filled(None, base.halfedge_count()),
         };
-        tracer.depart()?;
+        for &v in vertices {
+            for h in current.outgoing(v) {
+                tracer.depart(h)?;
+            }
+        }
         Ok(tracer)
     }
 
-    /// Finds where every base halfedge sets out: each sector between a current halfedge and the next counterclockwise knows how
+    /// Finds which base halfedges set out between a current halfedge and the next counterclockwise: the sector knows how
     /// many there are, and the roundabout which one is the first.
-    fn depart(&mut self) -> Result<(), CorrespondenceError> {
-        for h in self.current.halfedges() {
-            let along = i64::from(self.normal(h) == COINCIDENT);
-            // Corners in the order tail, head, apex of h.
-            let arcs = self.arcs(h);
-            if along + arcs.from[0] > i64::from(self.integers.valence[self.current.tail(h)]) {
-                return Err(Inconsistent("a corner sends out more edges than there are"));
-            }
-            for k in 0..along + arcs.from[0] {
-                let b = self
-                    .base_halfedge(h, k)
-                    .ok_or(Inconsistent("a boundary edge enters a face"))?;
-                let departure = if k < along {
-                    Departure::Along(h)
-                } else {
-                    let halfedge = self.current.next(h);
-                    // All coordinates fit 32 bits, since their sum does.
-                    let rank = (arcs.cut[1] + k - along) as u32;
-                    Departure::Through(Crossing { halfedge, rank })
-                };
-                if self.departure[b].replace(departure).is_some() {
-                    return Err(Inconsistent("a base edge sets out twice"));
-                }
+    fn depart(&mut self, h: HalfedgeId) -> Result<(), CorrespondenceError> {
+        let along = i64::from(self.normal(h) == COINCIDENT);
+        // Corners in the order tail, head, apex of h.
+        let arcs = self.arcs(h);
+        if along + arcs.from[0] > i64::from(self.integers.valence[self.current.tail(h)]) {
+            return Err(Inconsistent("a corner sends out more edges than there are"));
+        }
+        for k in 0..along + arcs.from[0] {
+            let slot = self
+                .slot(h, k)
+                .filter(|&slot| self.around[slot].is_some())
+                .ok_or(Inconsistent("a boundary edge enters a face"))?;
+            let departure = if k < along {
+                Departure::Along(h)
+            } else {
+                let halfedge = self.current.next(h);
+                // All coordinates fit 32 bits, since their sum does.
+                let rank = (arcs.cut[1] + k - along) as u32;
+                Departure::Through(Crossing { halfedge, rank })
+            };
+            if self.departure[slot].replace(departure).is_some() {
+                return Err(Inconsistent("a base edge sets out twice"));
             }
         }
         Ok(())
+    }
+
+    /// How a base halfedge sets out.
+    fn departure(&self, b: HalfedgeId) -> Option<Departure> {
+        let v = self.base.tail(b);
+        let first = self.first[v] as usize;
+        let valence = self.integers.valence[v] as usize;
+        let around = self.around.get(first..first.checked_add(valence)?)?;
+        let place = around.iter().position(|&other| other == Some(b))?;
+        self.departure[first + place]
     }
 
     /// Runs along a base halfedge and adds its crossings; the current halfedge that it is, if it is one. Fails before there are
@@ -164,10 +200,10 @@ impl<'a> Tracer<'a> {
         total: usize,
         crossing: &mut Vec<Crossing>,
     ) -> Result<Option<HalfedgeId>, CorrespondenceError> {
-        let mut at = match self.departure[b] {
+        let mut at = match self.departure(b) {
             None => return Err(Inconsistent("a base edge does not set out")),
             Some(Departure::Along(h)) => {
-                let back = self.base.twin(b).map(|t| self.departure[t]);
+                let back = self.base.twin(b).map(|t| self.departure(t));
                 let expected = self.current.twin(h).map(|t| Some(Departure::Along(t)));
                 return if back == expected {
                     Ok(Some(h))
@@ -220,10 +256,15 @@ impl<'a> Tracer<'a> {
 
     /// The k-th base halfedge counterclockwise at or after a current halfedge.
     fn base_halfedge(&self, h: HalfedgeId, k: i64) -> Option<HalfedgeId> {
+        self.slot(h, k).and_then(|slot| self.around[slot])
+    }
+
+    /// Where that stands in `around`; `None` at a vertex that nobody asked for.
+    fn slot(&self, h: HalfedgeId, k: i64) -> Option<usize> {
         let v = self.current.tail(h);
         let slot = i64::from(self.integers.roundabout[h]) + k;
         let slot = slot % i64::from(self.integers.valence[v]);
-        self.around[self.first[v] + slot as usize]
+        (self.first[v] != NONE).then(|| self.first[v] as usize + slot as usize)
     }
 
     /// The arcs in the face of a halfedge, at its tail, head and apex in this order.
