@@ -16,6 +16,7 @@
 //! is decided by θ_k + θ_m ≤ π from angles that keep their digits in needles.
 
 use crate::flow::correspondence::Correspondence;
+use crate::flow::mirror::Reflection;
 use crate::flow::schemes::FaceShape;
 use crate::geometry::connectivity::{Connectivity, Flip};
 use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, FaceVec, HalfedgeId, VertexVec};
@@ -157,6 +158,41 @@ impl Delaunay {
         self.flip_all(u, shape, Diagonal::Ptolemy);
     }
 
+    /// The same at u = 0 on a triangulation that is its own mirror image, of which one half tells about the other. Flips need not come in pairs.
+    pub fn evaluate_mirrored(&mut self, reflection: &Reflection, shape: &mut FaceVec<FaceShape>) {
+        let u = VertexVec::filled(0.0, self.connectivity.vertex_count());
+        let c = &self.connectivity;
+        let mut shapes = vec![FaceShape::default(); c.face_count()];
+        let (front, back) = shapes.split_at_mut(c.face_count() / 2);
+        let own = front.par_iter_mut().with_min_len(PIECE);
+        own.enumerate().for_each(|(f, shape)| {
+            *shape = log_face(self.log_sides(&u, FaceId::new(f)));
+        });
+        let front = &*front;
+        let images = back.par_iter_mut().with_min_len(PIECE);
+        images.enumerate().for_each(|(f, shape)| {
+            let corners = c.face_halfedges(FaceId::new(front.len() + f));
+            // A halfedge's image runs the other way, so the corner that it leaves is the image of the one where that ends.
+            let of = corners.map(|h| c.next(reflection.halfedge[h]));
+            let own = &front[c.face(of[0]).index()];
+            let of = of.map(|h| c.corner(h));
+            *shape = FaceShape {
+                angle: of.map(|k| own.angle[k]),
+                weight: of.map(|k| own.weight[k]),
+                broken: own.broken,
+            };
+        });
+        *shape = shapes.into();
+        let mut is_wrong = EdgeVec::filled(false, self.connectivity.edge_count());
+        for (e, &image) in reflection.edge.enumerate().filter(|(e, image)| e <= *image) {
+            is_wrong[e] = self.is_wrong(&u, shape, e);
+            is_wrong[image] = is_wrong[e];
+        }
+        let wrong = self.connectivity.edges().filter(|&e| is_wrong[e]);
+        let wrong = wrong.collect();
+        self.flip_from(wrong, &u, shape, Diagonal::Ptolemy);
+    }
+
     /// Takes `u` into the lengths: from now on it is counted from there.
     pub fn rebase(&mut self, u: &VertexVec<f64>) {
         for e in self.connectivity.edges() {
@@ -224,11 +260,21 @@ impl Delaunay {
     }
 
     fn flip_all(&mut self, u: &VertexVec<f64>, shape: &mut FaceVec<FaceShape>, diagonal: Diagonal) {
+        let wrong = |e: &EdgeId| self.is_wrong(u, shape, *e);
+        let wrong = self.connectivity.edges().filter(wrong).collect();
+        self.flip_from(wrong, u, shape, diagonal);
+    }
+
+    /// Flips the edges that are wrong, and those that become so.
+    fn flip_from(
+        &mut self,
+        wrong: Vec<EdgeId>,
+        u: &VertexVec<f64>,
+        shape: &mut FaceVec<FaceShape>,
+        diagonal: Diagonal,
+    ) {
         // Last in, first out: what a flip disturbs is looked at while it is in the cache.
-        let mut stack: Vec<EdgeId> = {
-            let wrong = |e: &EdgeId| self.is_wrong(u, shape, *e);
-            self.connectivity.edges().filter(wrong).collect()
-        };
+        let mut stack = wrong;
         stack.reverse();
         let mut flipped = Vec::new();
         while let Some(e) = stack.pop() {

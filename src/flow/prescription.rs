@@ -5,8 +5,11 @@
 
 use crate::flow::features::Feature;
 use crate::flow::field::{CrossField, Moved};
+use crate::flow::opened::Opened;
 use crate::flow::signature::Signature;
+use crate::flow::surface_delaunay::SurfaceDelaunay;
 use crate::geometry::ids::{HalfedgeId, VertexId, VertexVec};
+use std::sync::Arc;
 
 /// Bound on the difference between the total of K̄ and 2πχ, radians, that counts as rounding.
 pub const GAUSS_BONNET_TOLERANCE: f64 = 1e-9;
@@ -62,6 +65,8 @@ pub struct FromField {
     pub field: CrossField,
     /// Its cone angles and turnings there.
     pub signature: Signature,
+    /// The surface that is cut open along all features, with the triangulation that the field is on.
+    pub ground: Arc<(Opened, SurfaceDelaunay)>,
     /// Quarter turns that were moved from vertex to vertex so that a grid can have the cones.
     pub moved: Moved,
 }

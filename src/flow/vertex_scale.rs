@@ -1,6 +1,6 @@
 //! The vertex scale that comes nearest to a change of metric which need not be conformal.
 //!
-//! *Enters:* a closed triangulation and by how much the logarithm of every edge's length changes, in Penner coordinates. *Leaves:* one u a vertex.
+//! *Enters:* a triangulation, closed or the half of a symmetric double, and by how much the logarithm of every edge's length changes, in Penner coordinates. *Leaves:* one u a vertex.
 //! *Guaranteed:* a conformal change, d_ij = (u_i + u_j)/2, gives its own u back, to rounding.
 //!
 //! What it is for: a point of a face with barycentric coordinates b over its triangle is Σ b_i v_i, where v_i are the vectors on the light cone with
@@ -49,17 +49,21 @@ pub fn nearest_scale(
         let [i, j] = c.edge_vertices(e);
         (i != j).then(|| [unknown[i], unknown[j]])
     };
-    let pairs: Vec<[u32; 2]> = c
-        .edges()
-        .filter_map(ends)
-        .filter_map(|[i, j]| Some([i?, j?]))
-        .collect();
+    let (mut pairs, mut values) = (Vec::new(), Vec::new());
     let mut diagonal = vec![0.0; unknowns];
-    for i in c.edges().filter_map(ends).flatten().flatten() {
-        diagonal[i as usize] += 2.0;
+    for e in c.edges() {
+        let Some(ends) = ends(e) else { continue };
+        let faces = if c.is_boundary_edge(e) { 1.0 } else { 2.0 };
+        ends.into_iter()
+            .flatten()
+            .for_each(|i| diagonal[i as usize] += faces);
+        if let [Some(i), Some(j)] = ends {
+            pairs.push([i, j]);
+            values.push(-faces);
+        }
     }
     let mut solver = SymmetricSolver::new(unknowns, &pairs)?;
-    solver.factorize(&diagonal, &vec![-2.0; pairs.len()])?;
+    solver.factorize(&diagonal, &values)?;
     let mut u = VertexVec::filled(0.0, c.vertex_count());
     for _ in 0..=REFINEMENTS {
         let at = residual(c, change, &u);

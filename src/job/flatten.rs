@@ -73,6 +73,11 @@ pub(super) fn flatten(
     enter("flow")?;
     let metric = ricci::flow(c, &source_length, &prescription, &config.flow, observer)
         .map_err(|e| BuildError::flow(e, &mesh))?;
+    let prescription = Prescription {
+        // Of no use any more, and as large as the surface.
+        field: None,
+        ..prescription
+    };
     enter("overlay")?;
     let Overlay {
         mesh,

@@ -21,6 +21,7 @@ use crate::geometry::ids::{EdgeId, EdgeVec, FaceVec, HalfedgeId, VertexId, Verte
 use crate::geometry::mesh::Mesh;
 use crate::geometry::triangle;
 use std::f64::consts::FRAC_PI_2;
+use std::sync::Arc;
 
 /// Least angle of a cone, quarter turns: around a vertex of two quads these would share two edges.
 const LEAST_QUARTERS: i64 = 3;
@@ -127,8 +128,10 @@ fn along(
         let pairs = halfedges.filter_map(|h| Some([own_side(h), own_side(c.twin(h)?)]));
         pairs.collect()
     };
+    let sides = features.iter().map(sides_of).collect();
     let found = FromField {
-        sides: features.iter().map(sides_of).collect(),
+        sides,
+        ground: Arc::new((opened, ground)),
         features: Vec::new(),
         crowded: Vec::new(),
         field,

@@ -22,6 +22,7 @@ use crate::geometry::ids::{EdgeId, VertexVec};
 use crate::geometry::triangle;
 use crate::observe::Observer;
 use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
 
 /// Most Newton steps as long as features may be given up: those that can be met are met in fewer.
 const STEPS_WITH_FEATURES: usize = 40;
@@ -41,10 +42,19 @@ pub(super) fn flow(
             let features = from.features.iter().zip(&is_held);
             features.filter(|(_, held)| **held).map(|(f, _)| f)
         };
-        let opened = Opened::new(c, &edges_of(held()))?;
-        let ground = SurfaceDelaunay::along_features(c, surface.source_length, &opened, &all)?;
-        let on = LoopedSurface::along_features(&opened, &ground)?;
-        let signature = match is_held.iter().all(|held| *held) {
+        let is_whole = is_held.iter().all(|held| *held);
+        let ground = match is_whole {
+            true => from.ground.clone(),
+            false => {
+                let opened = Opened::new(c, &edges_of(held()))?;
+                let length = surface.source_length;
+                let ground = SurfaceDelaunay::along_features(c, length, &opened, &all)?;
+                Arc::new((opened, ground))
+            }
+        };
+        let (opened, ground) = &*ground;
+        let on = LoopedSurface::along_features(opened, ground)?;
+        let signature = match is_whole {
             true => from.signature.clone(),
             false => without(from, &is_held, &on)?,
         };
@@ -64,8 +74,7 @@ pub(super) fn flow(
         let found = match solved(&on, &log_length, &signature, params, max_steps, observer) {
             Ok(found) => {
                 let log_length = found.penner.iter().map(|l| 0.5 * l).collect();
-                let log_length = ground.on_delaunay(log_length);
-                with_lengths(&opened.connectivity, ground, log_length, &glued)
+                with_lengths(&opened.connectivity, ground, &on, log_length, &glued)
                     .map(|metric| (metric, found))
             }
             Err(error) => Err(error.into()),
@@ -82,7 +91,7 @@ pub(super) fn flow(
                 };
                 let which = match &error {
                     FlowError::Seamless(SeamlessError::Stalled { missing, .. }) => {
-                        hardest(&from.features, &is_held, &opened, missing)
+                        hardest(&from.features, &is_held, opened, missing)
                     }
                     FlowError::Seamless(SeamlessError::NoLine { edge })
                     | FlowError::Lines(StraightenError::Bent { edge }) => {
@@ -113,9 +122,9 @@ pub(super) fn flow(
             ..QuarterTurns::default()
         };
         if !met.lines.is_empty() {
-            metric.log_scale = joined_scale(&metric.log_scale, &opened, c.vertex_count());
-            metric.curvature = joined_curvature(&metric.curvature, &opened, c);
-            metric.opened = Some(Box::new(opened));
+            metric.log_scale = joined_scale(&metric.log_scale, opened, c.vertex_count());
+            metric.curvature = joined_curvature(&metric.curvature, opened, c);
+            metric.opened = Some(Box::new(opened.clone()));
         }
         return Ok(recorded(metric, found, &signature, met));
     }

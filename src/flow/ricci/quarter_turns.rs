@@ -70,8 +70,7 @@ fn with_cones(
     let max_steps = params.max_newton_steps;
     let found = solved(&on, &log_length, &signature, params, max_steps, observer)?;
     let log_length = found.penner.iter().map(|l| 0.5 * l).collect();
-    let log_length = ground.on_delaunay(log_length);
-    let metric = with_lengths(c, ground, log_length, &[])?;
+    let metric = with_lengths(c, &ground, &on, log_length, &[])?;
     Ok(recorded(metric, found, &signature, QuarterTurns::default()))
 }
 
@@ -184,7 +183,9 @@ mod tests {
                 l + 0.5 * (x.u[i] + x.u[j])
             };
             let log_length = ground.log_length.enumerate().map(scaled).collect();
-            let found = with_lengths(c, ground, log_length, &[]).unwrap();
+            let log_length = ground.on_symmetric(log_length);
+            let on = LoopedSurface::new(c, &ground).unwrap();
+            let found = with_lengths(c, &ground, &on, log_length, &[]).unwrap();
             let y = found.intrinsic.as_ref().unwrap();
             let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} against {b}");
             x.u.iter().zip(y.u.iter()).for_each(|(a, b)| close(*a, *b));

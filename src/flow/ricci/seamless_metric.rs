@@ -9,7 +9,6 @@ use super::params::FlowParams;
 use crate::flow::correspondence::Correspondence;
 use crate::flow::delaunay::Delaunay;
 use crate::flow::looped::LoopedSurface;
-use crate::flow::mirror::Reflection;
 use crate::flow::scale::at_unit_scale;
 use crate::flow::schemes::FaceShape;
 use crate::flow::seamless::{
@@ -72,24 +71,32 @@ pub(super) fn recorded(
     metric
 }
 
-/// The metric that B has with other lengths (natural logarithms, Penner coordinates), whose Delaunay triangulation must be flat but for cones, and symmetric on a
-/// double. `lines`: edges of A on the mirror that shall be edges of C. The record of how it was found is empty.
+/// The metric that the triangulation of loops has with other lengths (natural logarithms, Penner coordinates), whose Delaunay triangulation must be flat but for cones, and
+/// symmetric on a double. `on` must be that of `surface` and `ground`; `lines`: edges of A on the mirror that shall be edges of C. The record of how it was found is
+/// empty.
 pub(crate) fn with_lengths(
     surface: &Connectivity,
-    ground: SurfaceDelaunay,
+    ground: &SurfaceDelaunay,
+    on: &LoopedSurface,
     log_length: EdgeVec<f64>,
     lines: &[EdgeId],
 ) -> Result<FlatMetric, FlowError> {
+    let own = on.own();
+    let change = own.edges().map(|e| {
+        let whole = on.connectivity.edge(own.edge_halfedge(e));
+        log_length[whole] - on.length[whole].ln()
+    });
+    let mut u = nearest_scale(own, &change.collect())?;
+    if let Some(reflection) = on.reflection() {
+        let own = |(v, image): (VertexId, &VertexId)| u[v.min(*image)];
+        u = reflection.vertex.enumerate().map(own).collect();
+    }
+    let log_length = ground.on_delaunay(log_length);
     let parts = log_length.iter().zip(ground.log_length.iter());
     let change: EdgeVec<f64> = parts.map(|(to, from)| to - from).collect();
-    let mut u = nearest_scale(&ground.delaunay, &change)?;
-    if !surface.is_closed() {
-        // Vertices are those of the double as it was made, whatever was flipped.
-        u = Reflection::new(&ground.base, surface.face_count()).mean(&u);
-    }
     let conformal_error = conformal_error(&ground.delaunay, &change, &u);
     let delaunay_penner = at_unit_scale(&ground.delaunay, &log_length, &u);
-    let (mut flat, mut shape) = flipped(&ground, log_length);
+    let (mut flat, mut shape) = flipped(ground, log_length);
     if !surface.is_closed() {
         straighten_mirror(&mut flat, &ground.base, surface, lines)?;
         let still = VertexVec::filled(0.0, ground.base.vertex_count());
@@ -120,7 +127,7 @@ pub(crate) fn with_lengths(
             conformal_error,
             ..QuarterTurns::default()
         })),
-        intrinsic: Some(Box::new(ground.leave(
+        intrinsic: Some(Box::new(ground.clone().leave(
             surface.face_count(),
             flat,
             penner,

@@ -7,6 +7,7 @@ use super::Start;
 use crate::flow::correspondence::Correspondence;
 use crate::flow::delaunay::{Delaunay, PtolemyFlip};
 use crate::flow::holonomy::DualLoops;
+use crate::flow::mirror::Reflection;
 use crate::flow::schemes::FaceShape;
 use crate::flow::signature::Signature;
 use crate::flow::straighten::{EuclidFlip, StraightenError, Straightened, straighten};
@@ -19,6 +20,8 @@ use std::f64::consts::FRAC_PI_2;
 pub(super) struct Problem<'a> {
     pub(super) base: &'a Connectivity,
     loops: &'a DualLoops,
+    /// Where `base` is a double.
+    reflection: Option<&'a Reflection>,
     /// Θ̂, radians.
     theta: VertexVec<f64>,
     /// κ̂, radians.
@@ -86,6 +89,7 @@ impl<'a> Problem<'a> {
         Self {
             base,
             loops,
+            reflection,
             equation: equation.collect(),
             cone_equations,
             glued: start.glued,
@@ -153,7 +157,10 @@ impl<'a> Problem<'a> {
         delaunay.record = Some(Vec::new());
         let mut shape = FaceVec::default();
         let still = VertexVec::filled(0.0, self.base.vertex_count());
-        delaunay.evaluate(&still, &mut shape);
+        match self.reflection {
+            Some(reflection) => delaunay.evaluate_mirrored(reflection, &mut shape),
+            None => delaunay.evaluate(&still, &mut shape),
+        }
         let flips = delaunay.record.take().unwrap_or_default();
         let sides = self.sides(&mut delaunay);
         let bent = sides.as_ref().err().copied();
