@@ -232,6 +232,21 @@ impl Delaunay {
         });
     }
 
+    /// The same of the faces beside an edge alone.
+    pub fn update_faces_beside(
+        &self,
+        e: EdgeId,
+        u: &VertexVec<f64>,
+        shape: &mut FaceVec<FaceShape>,
+    ) {
+        let c = &self.connectivity;
+        let h = c.edge_halfedge(e);
+        let sides = [Some(h), c.twin(h)].into_iter().flatten();
+        for f in sides.map(|h| c.face(h)) {
+            shape[f] = log_face(self.log_sides(u, f));
+        }
+    }
+
     /// ln of the sides of a face at `u`, `k` opposite corner `k`, relative to the longest side. The sides' common
     /// factor e^{(u_i + u_j + u_k)/2} changes no angle.
     #[inline]

@@ -165,8 +165,8 @@ impl<'a> Problem<'a> {
         let sides = self.sides(&mut delaunay);
         let bent = sides.as_ref().err().copied();
         let sides = sides.unwrap_or_default();
-        if !sides.flips.is_empty() {
-            delaunay.update_shapes(&still, &mut shape);
+        for flip in &sides.flips {
+            delaunay.update_faces_beside(flip.edge, &still, &mut shape);
         }
         let glued: Vec<[EdgeId; 2]> = match bent.is_none() {
             true => (sides.edge.chunks_exact(2))
