@@ -28,6 +28,7 @@ pub fn lines(text: &str) -> impl Iterator<Item = (u32, Vec<Range<usize>>)> + '_ 
     };
     let numbered = (1_u32..).zip(text.split('\n'));
     numbered
+        .flat_map(|(number, line)| line.split('\r').map(move |part| (number, part)))
         .map(move |(number, line)| (number, words(line)))
         .filter(|(_, words): &(u32, Vec<_>)| !words.is_empty())
 }

@@ -35,11 +35,10 @@ pub fn principal(c: &Connectivity, positions: &VertexVec<[f64; 3]>) -> FaceVec<[
             z[0] += weight * (2.0 * angle).cos();
             z[1] += weight * (2.0 * angle).sin();
         }
-        let is_finite = doubled > 0.0 && z.iter().all(|x| x.is_finite());
-        if is_finite {
-            z.map(|x| x / doubled)
-        } else {
-            [0.0; 2]
+        let z = z.map(|x| x / doubled);
+        match z.iter().all(|x| x.is_finite()) {
+            true => z,
+            false => [0.0; 2],
         }
     };
     c.faces().map(on_face).collect()

@@ -6,6 +6,7 @@
 
 use super::atlas::{FolderError, checked_json};
 use super::npz::Npz;
+use crate::geometry::ids::NONE;
 use serde::Deserialize;
 use std::path::Path;
 
@@ -18,6 +19,23 @@ pub struct StoredCone {
     pub source_vertex: Option<u32>,
     /// Prescribed curvature, radians.
     pub curvature: f64,
+}
+
+/// How quarter turns were met.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StoredTurns {
+    /// By how many quarter turns every loop turns, and by how much it misses that, radians.
+    pub loops: Vec<(i64, f64)>,
+    /// Root of the mean square and maximum, of λ.
+    pub conformal_error: [f64; 2],
+    /// Quarter turns moved between vertices for the sake of a grid.
+    pub adjusted: usize,
+    /// Quarter turns moved between cones, of which one is gone.
+    pub merged: usize,
+    /// Number of features that are lines.
+    pub lines: usize,
+    /// The others: number of edges, and both ends as vertices of the input file; absent for one that repair made.
+    pub given_up: Vec<(usize, [Option<u32>; 2])>,
 }
 
 /// A surface with its flat lengths.
@@ -33,11 +51,79 @@ pub struct StoredMetric {
     pub source_face: Vec<u32>,
     /// Cones.
     pub cones: Vec<StoredCone>,
+    /// Where all transitions are quarter turns because that was asked for.
+    pub turns: Option<StoredTurns>,
 }
 
 #[derive(Deserialize)]
 struct Document {
     cones: Vec<StoredCone>,
+    metric: Metric,
+    quality: Quality,
+    #[serde(default)]
+    features: Vec<Feature>,
+}
+
+#[derive(Deserialize)]
+struct Metric {
+    holonomy: Option<Holonomy>,
+}
+
+#[derive(Deserialize)]
+struct Holonomy {
+    loops: Vec<Loop>,
+    adjusted: usize,
+    #[serde(default)]
+    merged: usize,
+}
+
+#[derive(Deserialize)]
+struct Loop {
+    turns: i64,
+    residual: f64,
+}
+
+#[derive(Deserialize)]
+struct Quality {
+    conformal_error: Option<ConformalError>,
+}
+
+#[derive(Deserialize)]
+struct ConformalError {
+    rms: f64,
+    max: f64,
+}
+
+#[derive(Deserialize)]
+struct Feature {
+    vertices: Vec<usize>,
+    is_line: bool,
+}
+
+impl Document {
+    /// `source_vertex`: the vertex of the input file of every row of `positions`.
+    fn turns(&self, source_vertex: &[u32]) -> Option<StoredTurns> {
+        let holonomy = self.metric.holonomy.as_ref()?;
+        let error = self.quality.conformal_error.as_ref();
+        let name = |v: Option<&usize>| {
+            let named = v.and_then(|&v| source_vertex.get(v));
+            named.copied().filter(|&v| v != NONE)
+        };
+        let given_up = self.features.iter().filter(|f| !f.is_line).map(|f| {
+            let ends = [name(f.vertices.first()), name(f.vertices.last())];
+            (f.vertices.len().saturating_sub(1), ends)
+        });
+        Some(StoredTurns {
+            loops: (holonomy.loops.iter())
+                .map(|l| (l.turns, l.residual))
+                .collect(),
+            conformal_error: error.map_or([0.0; 2], |e| [e.rms, e.max]),
+            adjusted: holonomy.adjusted,
+            merged: holonomy.merged,
+            lines: self.features.iter().filter(|f| f.is_line).count(),
+            given_up: given_up.collect(),
+        })
+    }
 }
 
 /// Reads the flat metric of one component.
@@ -51,15 +137,18 @@ pub fn read_metric(folder: &Path) -> Result<StoredMetric, FolderError> {
     };
     let value = checked_json(&folder.join("atlas.json"))?;
     let document = Document::deserialize(&value).map_err(|e| at("atlas.json", e.to_string()))?;
-    arrays(&folder.join("atlas.npz"), document.cones).map_err(|problem| at("atlas.npz", problem))
+    arrays(&folder.join("atlas.npz"), document).map_err(|problem| at("atlas.npz", problem))
 }
 
-fn arrays(path: &Path, cones: Vec<StoredCone>) -> Result<StoredMetric, String> {
+fn arrays(path: &Path, document: Document) -> Result<StoredMetric, String> {
     let mut npz = Npz::open(path)?;
     let (positions, vertices) = npz.read::<f64>("positions", &[None, Some(3)])?;
     let (faces, count) = npz.read::<u32>("faces", &[None, Some(3)])?;
     let (flat_length, _) = npz.read::<f64>("flat_length", &[Some(count), Some(3)])?;
     let (source_face, _) = npz.read::<u32>("source_face", &[Some(count)])?;
+    let (source_vertex, _) = npz.read::<u32>("source_vertex", &[Some(vertices)])?;
+    let turns = document.turns(&source_vertex);
+    let cones = document.cones;
     for (name, numbers) in [("positions", &positions), ("flat_length", &flat_length)] {
         if let Some(i) = numbers.iter().position(|x| !x.is_finite()) {
             return Err(format!(
@@ -87,5 +176,6 @@ fn arrays(path: &Path, cones: Vec<StoredCone>) -> Result<StoredMetric, String> {
         flat_length: flat_length.as_chunks::<3>().0.to_vec(),
         source_face,
         cones,
+        turns,
     })
 }

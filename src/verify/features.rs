@@ -1,6 +1,6 @@
 //! Features that are lines: every edge of theirs is parallel to one of the axes, on both sides and up to quarter turns; and the loops' own figures.
 //!
-//! All transitions of an atlas with lines are quarter turns, so the axes are the same all over the surface. Which directions they are the first edge says.
+//! All transitions of an atlas with lines are quarter turns, so the axes are the same all over the surface.
 
 use super::Verdicts;
 use super::arrays::Arrays;
@@ -39,25 +39,23 @@ pub(super) fn check(
     // Edges that a line has lost to another division of the surface are not there to be tested.
     let edges = lines().flat_map(|f| f.vertices.windows(2));
     let sides = edges.flat_map(|pair| between(surface, pair[0], pair[1]));
-    let mut axis = None;
     let (mut worst, mut count) = (Worst::default(), 0);
     for h in sides {
         let at = |corner| at_corner(&arrays.central_uv, corner);
         let ends = [at(surface.tail_corner(h)), at(surface.head_corner(h))];
         let along = sub2(ends[1], ends[0]);
         let direction = along[1].atan2(along[0]);
-        let first = *axis.get_or_insert(direction);
         let length = distance2(ends[0], ends[1]);
         let rounding = match length > 0.0 {
             true => (FLOOR * slit.diameter / length).min(TOLERANCE),
             false => f64::NAN,
         };
-        worst.see((off_multiple(direction - first, FRAC_PI_2) - 4.0 * rounding).max(0.0));
+        worst.see((off_multiple(direction, FRAC_PI_2) - 4.0 * rounding).max(0.0));
         count += 1;
     }
     verdicts.note(
         "features that are lines are straight",
-        count > 0 && worst.0 < TOLERANCE,
+        worst.0 < TOLERANCE,
         format!("{:.3e} rad, {count} sides of edges", worst.0),
     );
 }

@@ -275,7 +275,7 @@ fn lines(atlas: &AffineAtlas, archive: &mut Archive) -> bool {
     archive.integers("line_kind", &column(0));
     archive.integers("line_corner", &column(1));
     archive.integers("line_segment", &column(2));
-    !feature_edges.is_empty()
+    lines.iter().any(|line| line[0] == 3)
 }
 
 /// Normals of vertices and faces. Those of faces are those of the face in the file, because the parts that the overlay cuts it

@@ -30,6 +30,9 @@ const LEAST_QUARTERS: i64 = 3;
 /// thousand quads. Half of the cones of a scan go, and the deviation of the log scale grows by a tenth at most.
 const NEAR: f64 = 0.01;
 
+/// Most that curvature may weigh in a face, beside an edge: thin ones would say what they do not know.
+const MOST_PULL: f64 = 1.0;
+
 /// Part of the features, the least important ones, that are left out at a time where they are too many.
 const GIVEN_UP: usize = 8;
 
@@ -82,9 +85,14 @@ fn along(
     // Faces of the triangulation that was flipped, where their corners are in space.
     let places = opened.vertex.iter().map(|&v| mesh.positions[v]);
     let principal = curvature::principal(own, &places.collect());
-    let pull = principal
-        .enumerate()
-        .map(|(f, &[x, y])| [x * x - y * y, 2.0 * x * y].map(|p| params.curvature * area[f] * p));
+    let pull = principal.enumerate().map(|(f, &[x, y])| {
+        let (square, weight) = (x * x + y * y, params.curvature * area[f]);
+        let weight = weight.min(MOST_PULL / square);
+        match square > 0.0 && weight.is_finite() {
+            true => [x * x - y * y, 2.0 * x * y].map(|p| weight * p),
+            false => [0.0; 2],
+        }
+    });
     let pull: FaceVec<[f64; 2]> = pull.collect();
     let mut field = cross_field(own, &angle, &area, &pull)?;
     let asked = GridCones {

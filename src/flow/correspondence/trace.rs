@@ -6,7 +6,7 @@
 
 use super::{Arcs, COINCIDENT, Correspondence, CorrespondenceError, Crossing, Curves};
 use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{EdgeVec, HalfedgeId, NONE, VertexId, VertexVec};
+use crate::geometry::ids::{EdgeVec, HalfedgeId, HalfedgeVec, NONE, VertexId, VertexVec};
 
 use CorrespondenceError::Inconsistent;
 
@@ -98,6 +98,8 @@ pub(super) struct Tracer<'a> {
     around: Vec<Option<HalfedgeId>>,
     /// Where a vertex begins in `around`; [`NONE`] where nobody asked for it.
     first: VertexVec<u32>,
+    /// Where a base halfedge stands in `around`; [`NONE`] where nobody asked for its tail.
+    place: HalfedgeVec<u32>,
     /// How each of `around` sets out.
     departure: Vec<Option<Departure>>,
 }
@@ -137,7 +139,14 @@ impl<'a> Tracer<'a> {
                 return Err(Inconsistent("a base vertex has another number of edges"));
             }
         }
+        let mut place = HalfedgeVec::filled(NONE, base.halfedge_count());
+        for (at, h) in (0..).zip(&around) {
+            if let Some(h) = h {
+                place[*h] = at;
+            }
+        }
         let mut tracer = Tracer {
+            place,
             integers,
             base,
             current,
@@ -184,12 +193,8 @@ impl<'a> Tracer<'a> {
 
     /// How a base halfedge sets out.
     fn departure(&self, b: HalfedgeId) -> Option<Departure> {
-        let v = self.base.tail(b);
-        let first = self.first[v] as usize;
-        let valence = self.integers.valence[v] as usize;
-        let around = self.around.get(first..first.checked_add(valence)?)?;
-        let place = around.iter().position(|&other| other == Some(b))?;
-        self.departure[first + place]
+        let place = self.place[b] as usize;
+        self.departure.get(place).copied().flatten()
     }
 
     /// Runs along a base halfedge and adds its crossings; the current halfedge that it is, if it is one. Fails before there are

@@ -55,6 +55,15 @@ pub struct Moved {
     pub merged: usize,
 }
 
+/// Which pairs of cones are merged.
+#[derive(Clone, Copy, Debug)]
+enum Reach {
+    /// Those that are as near as this.
+    Near(f64),
+    /// All, as long as there are more cones inside.
+    WhileMoreThan(usize),
+}
+
 impl CrossField {
     /// The signature with cones as they are asked for, at least one quarter turn at every vertex of the border and in every sector between features, and how many quarter turns were
     /// moved for it. Of a torus whose signature no metric has, the flat one: no cones, no turning. `angle`: corner angles of the surface's own part, radians.
@@ -118,22 +127,28 @@ impl CrossField {
         asked: &GridCones,
     ) -> Result<usize, FieldError> {
         let c = angles.c;
-        let positive = c.vertices().filter(|&v| angles.excess(v) < 0).collect();
         let opposite = |angles: &Angles<'_>, to| match angles.excess(to) {
             excess if excess < 0 => -excess,
             _ => 0,
-        };
-        let mut moved = self.merge_each(angles, length, asked, positive, opposite);
-        let negative = c.vertices().filter(|&v| angles.excess(v) > 0).collect();
-        let asked = GridCones {
-            near: 0.0,
-            ..*asked
         };
         let alike = |angles: &Angles<'_>, to| match angles.excess(to) {
             excess if excess > 0 => i64::MAX,
             _ => 0,
         };
-        moved += self.merge_each(angles, length, &asked, negative, alike);
+        let with = |angles: &Angles<'_>, sign: i64| -> Vec<VertexId> {
+            let vertices = c.vertices();
+            vertices
+                .filter(|&v| angles.excess(v).signum() == sign)
+                .collect()
+        };
+        let (near, few) = (Reach::Near(asked.near), Reach::WhileMoreThan(asked.most));
+        let mut moved = 0;
+        let receivers = with(angles, -1);
+        moved += self.merge_each(angles, length, near, receivers, opposite);
+        let receivers = with(angles, -1);
+        moved += self.merge_each(angles, length, few, receivers, opposite);
+        let receivers = with(angles, 1);
+        moved += self.merge_each(angles, length, few, receivers, alike);
         match angles.inside > asked.most {
             true => Err(FieldError::TooManyCones {
                 left: angles.inside,
@@ -148,7 +163,7 @@ impl CrossField {
         &mut self,
         angles: &mut Angles<'_>,
         length: &EdgeVec<f64>,
-        asked: &GridCones,
+        reach: Reach,
         receivers: Vec<VertexId>,
         room: impl Fn(&Angles<'_>, VertexId) -> i64,
     ) -> usize {
@@ -156,14 +171,18 @@ impl CrossField {
             if room(angles, to) == 0 {
                 return None;
             }
-            let is_too_many = angles.inside > asked.most;
-            let reach = if is_too_many {
-                f64::INFINITY
-            } else {
-                asked.near
+            let most = match reach {
+                Reach::Near(distance) => distance,
+                Reach::WhileMoreThan(most) if angles.inside > most => f64::INFINITY,
+                Reach::WhileMoreThan(_) => return None,
             };
-            let gives = |v| angles.excess(v) > 0 && !angles.lacks_after(v, 1);
-            angles.way(length, to, reach, |v| gives(v).then_some(1.0))
+            // Two corners of the border are no cones inside.
+            let counts = |v| matches!(reach, Reach::Near(_)) || !angles.is_on_border(v);
+            let gives = |v| {
+                let is_pair = counts(to) || counts(v);
+                is_pair && angles.excess(v) > 0 && !angles.lacks_after(v, 1)
+            };
+            angles.way(length, to, most, |v| gives(v).then_some(1.0))
         };
         let mut pairs = BinaryHeap::new();
         for to in receivers {

@@ -116,13 +116,24 @@ impl<'a> Angles<'a> {
         self.lacks_after(v, 0)
     }
 
-    /// The angle less that without a cone.
+    /// By how much a sector's angle, and with it that of its vertex, is more than without a cone: 0 where one of both is not, or one is more and the other less.
     pub fn excess(&self, v: VertexId) -> i64 {
-        let flat = match self.is_corner(v) {
+        let of = self.vertex[v];
+        let flat = |is_half: bool| match is_half {
             true => FULL_TURN / 2,
             false => FULL_TURN,
         };
-        self.cone[v] - flat
+        let own = self.cone[v] - flat(self.is_corner(v));
+        let whole = self.total[of] - flat(self.is_border[of]);
+        match own.signum() == whole.signum() {
+            true => own.signum() * own.abs().min(whole.abs()),
+            false => 0,
+        }
+    }
+
+    /// True on the border of the surface, where a corner is no cone inside.
+    pub fn is_on_border(&self, v: VertexId) -> bool {
+        self.is_border[self.vertex[v]]
     }
 
     /// Where a step begins.

@@ -14,7 +14,7 @@ use crate::flow::metric::face_lengths;
 use crate::flow::opened::Opened;
 use crate::flow::prescription::FromField;
 use crate::flow::seamless::SeamlessError;
-use crate::flow::signature::Signature;
+use crate::flow::signature::{Infeasible, Signature};
 use crate::flow::straighten::StraightenError;
 use crate::flow::surface_delaunay::SurfaceDelaunay;
 use crate::geometry::connectivity::Connectivity;
@@ -161,7 +161,12 @@ fn without(from: &FromField, is_held: &[bool], on: &LoopedSurface) -> Result<Sig
         let angles = triangle::angles(face_lengths(own, &length, f));
         angles.unwrap_or([f64::NAN; 3])
     });
-    Ok(field.signature(on, &angle.collect())?)
+    let mut signature = field.signature(on, &angle.collect())?;
+    let checked = signature.check(on.connectivity, &on.loops);
+    if let Err(Infeasible::FlatTorus { .. }) = checked {
+        signature.turning.fill(0);
+    }
+    Ok(signature)
 }
 
 fn edges_of<'a>(features: impl Iterator<Item = &'a Feature>) -> Vec<EdgeId> {

@@ -82,9 +82,11 @@ pub(crate) fn with_lengths(
     lines: &[EdgeId],
 ) -> Result<FlatMetric, FlowError> {
     let own = on.own();
+    // Penner coordinates as well: T need not be Delaunay, so its lengths in the surface are others.
+    let from = ground.on_symmetric(ground.log_length.clone());
     let change = own.edges().map(|e| {
         let whole = on.connectivity.edge(own.edge_halfedge(e));
-        log_length[whole] - on.length[whole].ln()
+        log_length[whole] - from[whole]
     });
     let mut u = nearest_scale(own, &change.collect())?;
     if let Some(reflection) = on.reflection() {

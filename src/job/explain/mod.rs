@@ -141,7 +141,7 @@ fn flat(
         ..
     } = flatten(mesh, prescription, config, &(), &|_| Ok(()))?;
     let turns = metric.quarter_turns.as_ref();
-    let turns = turns.map_or_else(Vec::new, |met| turns::describe(met, &mesh));
+    let turns = turns.map_or_else(Vec::new, |met| turns::describe(&turns::of(met, &mesh)));
     Ok((Flat::of(&mesh, &metric, &prescription, &frame), turns))
 }
 
@@ -168,8 +168,11 @@ pub fn folder(folder: &Path) -> Result<Explanation, FolderError> {
                 "  "
             }
         };
-        let (lines, surface) = Flat::stored(read_metric(&path)?).explain(name);
+        let stored = read_metric(&path)?;
+        let turns = stored.turns.as_ref().map_or_else(Vec::new, turns::describe);
+        let (lines, surface) = Flat::stored(stored).explain(name);
         explanation.say(indent, lines);
+        explanation.say(indent, turns);
         explanation.surfaces.push(surface);
     }
     Ok(explanation)

@@ -5,12 +5,30 @@ use crate::flow::features::Feature;
 use crate::flow::ricci::QuarterTurns;
 use crate::geometry::ids::{NONE, VertexId};
 use crate::geometry::mesh::Mesh;
+use crate::read::metric::StoredTurns;
 
 /// Loops and features that are told of one by one.
 const TOLD: usize = 12;
 
+/// What a build would store.
+pub(super) fn of(met: &QuarterTurns, mesh: &Mesh) -> StoredTurns {
+    let name = |v: Option<&VertexId>| v.map(|&v| mesh.source_vertex[v]).filter(|&v| v != NONE);
+    let given_up = |f: &Feature| {
+        let ends = [name(f.vertices.first()), name(f.vertices.last())];
+        (f.edges.len(), ends)
+    };
+    StoredTurns {
+        loops: met.loops.clone(),
+        conformal_error: met.conformal_error,
+        adjusted: met.moved.to_least,
+        merged: met.moved.merged,
+        lines: met.lines.len(),
+        given_up: met.given_up.iter().map(given_up).collect(),
+    }
+}
+
 /// Sentences; vertices are named as in the input file.
-pub(super) fn describe(met: &QuarterTurns, mesh: &Mesh) -> Vec<String> {
+pub(super) fn describe(met: &StoredTurns) -> Vec<String> {
     let mut lines = Vec::new();
     let worst = met.loops.iter().fold(0.0_f64, |m, l| m.max(l.1.abs()));
     let turns: Vec<String> = met.loops.iter().map(|l| l.0.to_string()).collect();
@@ -33,35 +51,33 @@ pub(super) fn describe(met: &QuarterTurns, mesh: &Mesh) -> Vec<String> {
         0.5 * most
     ));
     let turns = |count| counted(count, "quarter turn was", "quarter turns were");
-    if met.moved.to_least > 0 {
+    if met.adjusted > 0 {
         lines.push(format!(
             "{} moved between vertices, so that a grid can have the cones of the field",
-            turns(met.moved.to_least)
+            turns(met.adjusted)
         ));
     }
-    if met.moved.merged > 0 {
+    if met.merged > 0 {
         lines.push(format!(
             "{} moved between cones of the field that were near each other or more than cones.count, so that one of two is gone",
-            turns(met.moved.merged)
+            turns(met.merged)
         ));
     }
-    let all = met.lines.len() + met.given_up.len();
+    let all = met.lines + met.given_up.len();
     if all > 0 {
         lines.push(format!(
             "{} of {all} features are straight lines",
-            met.lines.len()
+            met.lines
         ));
     }
-    let end = |v: Option<&VertexId>| match v.map(|&v| mesh.source_vertex[v]) {
-        Some(v) if v != NONE => v.to_string(),
-        _ => "a new one".to_owned(),
-    };
-    let given_up = |f: &Feature| {
+    let name = |v: Option<u32>| v.map_or("a new one".to_owned(), |v| v.to_string());
+    let given_up = |feature: &(usize, [Option<u32>; 2])| {
+        let (edges, [from, to]) = *feature;
         format!(
             "no line: {} from vertex {} to vertex {}",
-            counted(f.edges.len(), "edge", "edges"),
-            end(f.vertices.first()),
-            end(f.vertices.last())
+            counted(edges, "edge", "edges"),
+            name(from),
+            name(to)
         )
     };
     lines.extend(met.given_up.iter().take(TOLD).map(given_up));
