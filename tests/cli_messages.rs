@@ -890,7 +890,7 @@ fn cone_files_that_are_no_lists_of_cones() {
            1.570796`; `cones.file_first_vertex` says where numbers begin
     ");
     insta::assert_snapshot!(cone_file_refusal("# ears\nleft 1.5\n", "", 2), @r#"
-     error: a line of cones.file begins with the number of a vertex, but "left" is none
+     error: in cones.file a vertex is a whole number, but "left" is none
       ,-[my.cones.txt:2:1]
     1 | # ears
     2 | left 1.5
@@ -939,7 +939,7 @@ fn cone_files_that_do_not_fit_the_mesh_or_the_keys() {
     insta::assert_snapshot!(cone_file_refusal("0 3.14\n1 3.14\n2 3.14\n3 3.14", "", 1), @"failed: tetra (prescription): the prescribed curvatures sum to 3.9979721705π (12.560000000 rad), but Gauss–Bonnet requires 2πχ = 4π (12.566370614 rad) on a surface with χ = 2 (genus 0, 0 boundary loops): change the total by 0.0020278295π");
     insta::assert_snapshot!(cone_file_refusal(pi, "strategy = \"spread\"\n", 1), @r#"failed: tetra (prescription): cones.file and cones.strategy = "spread" exclude each other: remove one of them"#);
     insta::assert_snapshot!(cone_file_refusal(pi, "list = [{ vertex = 0, curvature = 1 }]\n", 2), @r"
-    error: `cones.list` and `cones.file` both name cones
+    error: `cones.list` and `cones.file` exclude each other
     help: remove one of them
     ");
     insta::assert_snapshot!(cone_file_refusal(pi, "max_curvature = 2\n", 2), @r#"
@@ -955,7 +955,7 @@ fn cone_files_that_do_not_fit_the_mesh_or_the_keys() {
     "#);
     let folder = folder();
     insta::assert_snapshot!(refusal(folder.path(), &["build", "a.obj", "--set", "cones.file=b.txt"], 2), @r"
-    error: the cone file b.txt cannot be read: there is no such file
+    error: `cones.file` names b.txt, which cannot be read: there is no such file
     help: `cones.file` starts at the configuration's folder (with `--set` at the current one); check
           the name and that it is UTF-8 text
     ");

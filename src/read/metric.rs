@@ -58,13 +58,15 @@ pub struct StoredMetric {
 #[derive(Deserialize)]
 struct Document {
     cones: Vec<StoredCone>,
+    #[serde(default)]
     metric: Metric,
+    #[serde(default)]
     quality: Quality,
     #[serde(default)]
     features: Vec<Feature>,
 }
 
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 struct Metric {
     holonomy: Option<Holonomy>,
 }
@@ -83,7 +85,7 @@ struct Loop {
     residual: f64,
 }
 
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 struct Quality {
     conformal_error: Option<ConformalError>,
 }
@@ -102,8 +104,7 @@ struct Feature {
 
 impl Document {
     /// `source_vertex`: the vertex of the input file of every row of `positions`.
-    fn turns(&self, source_vertex: &[u32]) -> Option<StoredTurns> {
-        let holonomy = self.metric.holonomy.as_ref()?;
+    fn turns(&self, holonomy: &Holonomy, source_vertex: &[u32]) -> StoredTurns {
         let error = self.quality.conformal_error.as_ref();
         let name = |v: Option<&usize>| {
             let named = v.and_then(|&v| source_vertex.get(v));
@@ -113,7 +114,7 @@ impl Document {
             let ends = [name(f.vertices.first()), name(f.vertices.last())];
             (f.vertices.len().saturating_sub(1), ends)
         });
-        Some(StoredTurns {
+        StoredTurns {
             loops: (holonomy.loops.iter())
                 .map(|l| (l.turns, l.residual))
                 .collect(),
@@ -122,7 +123,7 @@ impl Document {
             merged: holonomy.merged,
             lines: self.features.iter().filter(|f| f.is_line).count(),
             given_up: given_up.collect(),
-        })
+        }
     }
 }
 
@@ -146,8 +147,13 @@ fn arrays(path: &Path, document: Document) -> Result<StoredMetric, String> {
     let (faces, count) = npz.read::<u32>("faces", &[None, Some(3)])?;
     let (flat_length, _) = npz.read::<f64>("flat_length", &[Some(count), Some(3)])?;
     let (source_face, _) = npz.read::<u32>("source_face", &[Some(count)])?;
-    let (source_vertex, _) = npz.read::<u32>("source_vertex", &[Some(vertices)])?;
-    let turns = document.turns(&source_vertex);
+    let turns = match &document.metric.holonomy {
+        Some(holonomy) => {
+            let (source_vertex, _) = npz.read::<u32>("source_vertex", &[Some(vertices)])?;
+            Some(document.turns(holonomy, &source_vertex))
+        }
+        None => None,
+    };
     let cones = document.cones;
     for (name, numbers) in [("positions", &positions), ("flat_length", &flat_length)] {
         if let Some(i) = numbers.iter().position(|x| !x.is_finite()) {
