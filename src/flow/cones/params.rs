@@ -16,7 +16,7 @@ pub enum ConeStrategy {
     Auto,
     /// Those of the list.
     Listed,
-    /// The singular vertices of the smoothest cross field, on closed surfaces.
+    /// The singular vertices of the smoothest cross field, and corners of borders.
     Field,
     /// All curvature at one interior vertex.
     Single,
