@@ -37,10 +37,7 @@ const CONFIGURATIONS: [(&str, &[&str]); 20] = [
     ("single", &["cones.strategy=single"]),
     ("spread", &["cones.strategy=spread"]),
     ("quantum", &["cones.quantum=\"1/2\""]),
-    (
-        "field",
-        &["cones.strategy=field", "flow.holonomy=quarter-turns"],
-    ),
+    ("field", FIELD),
     (
         "packed",
         &["patches.packed_side=128", "patches.max_count=4"],
@@ -62,6 +59,8 @@ const CONFIGURATIONS: [(&str, &[&str]); 20] = [
 ];
 
 const PLAIN: &[&str] = &["pictures.enabled=false", "report.enabled=false"];
+
+const FIELD: &[&str] = &["cones.strategy=field", "flow.holonomy=quarter-turns"];
 
 /// What may be wrong with a mesh or a configuration; everything else is wrong with the program, or costs too much.
 const REFUSALS: [&str; 3] = ["input", "prescription", "not_converged"];
@@ -117,6 +116,16 @@ const GENERATED: [(&str, Mesh, &str); 13] = [
     ("random-positions", shapes::random_positions, ""),
 ];
 
+/// Generated meshes that must be built with the cones of a field too.
+const IN_A_FIELD: [&str; 6] = [
+    "fan",
+    "bipyramid",
+    "noise",
+    "tube",
+    "far",
+    "random-positions",
+];
+
 fn main() {
     let arguments = Arguments::from_args();
     let mut trials = Vec::new();
@@ -125,9 +134,21 @@ fn main() {
             let folder = tempfile::tempdir()?;
             let path = folder.path().join(format!("{name}.obj"));
             shapes::write(&path, &mesh());
-            pair(&path, "defaults", &[], words, false)
+            pair(&path, "defaults", &[], words, false).map(drop)
         };
         trials.push(Trial::test(format!("generated/{name}"), run));
+        if IN_A_FIELD.contains(&name) {
+            let run = move || {
+                let folder = tempfile::tempdir()?;
+                let path = folder.path().join(format!("{name}.obj"));
+                shapes::write(&path, &mesh());
+                match pair(&path, "field", FIELD, "", false)? {
+                    0 => Err("is not built".into()),
+                    _ => Ok(()),
+                }
+            };
+            trials.push(Trial::test(format!("generated/field/{name}"), run));
+        }
     }
     let corpus = std::env::var_os("AFFINE_ATLAS_CORPUS").map(PathBuf::from);
     let files = corpus.iter().flat_map(|folder| files(&folder.join("hard")));
@@ -135,12 +156,12 @@ fn main() {
     for file in &files {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let path = file.clone();
-        let run = move || pair(&path, "defaults", &[], "", false);
+        let run = move || pair(&path, "defaults", &[], "", false).map(drop);
         let is_long = LONG.contains(&&*name);
         trials.push(Trial::test(format!("quick/{name}"), run).with_ignored_flag(is_long));
         for (configuration, settings) in CONFIGURATIONS {
             let path = file.clone();
-            let run = move || pair(&path, configuration, settings, "", true);
+            let run = move || pair(&path, configuration, settings, "", true).map(drop);
             let name = format!("hard/{configuration}/{name}");
             trials.push(Trial::test(name, run).with_ignored_flag(true));
         }
@@ -179,14 +200,14 @@ fn program() -> Command {
     command
 }
 
-/// Builds a mesh with a configuration, prints what it cost, and holds it to what must be. `words` are those of a refusal.
+/// Builds a mesh with a configuration, prints what it cost, and holds it to what must be. `words` are those of a refusal. Returns how many components were built.
 fn pair(
     mesh: &Path,
     configuration: &str,
     settings: &[&str],
     words: &str,
     is_long: bool,
-) -> Result<(), Failed> {
+) -> Result<usize, Failed> {
     let folder = tempfile::tempdir()?;
     let mut command = program();
     command.args(["build", "--quiet", "--threads", "1", "--jobs", "1"]);
@@ -230,7 +251,7 @@ fn pair(
     }
     within_limits(cost, peak, bytes(mesh))?;
     if built == 0 {
-        return Ok(());
+        return Ok(0);
     }
     let mut verify = program();
     succeed("verify", verify.arg("verify").arg(folder.path()))?;
@@ -244,7 +265,7 @@ fn pair(
         let source = comparable(mesh).filter(|_| same && parts.len() == 1);
         checked(&atlas, source, None)?;
     }
-    Ok(())
+    Ok(built)
 }
 
 /// The components of an asset; the asset itself where it was refused before it fell into any.

@@ -4,24 +4,24 @@
 //! as long on one side as on the other, or an error. *Not guaranteed:* that all features are lines: a cycle of them may ask for more than any metric has. Those that are not are named.
 
 use super::error::FlowError;
-use super::flat_metric::{FlatMetric, QuarterTurns};
-use super::flipping::Surface;
+use super::flat_metric::FlatMetric;
+use super::flipping::{self, Surface};
 use super::params::FlowParams;
-use super::seamless_metric::{recorded, solved, with_lengths};
+use super::seamless_metric::Sought;
 use crate::flow::features::Feature;
 use crate::flow::looped::LoopedSurface;
 use crate::flow::metric::face_lengths;
 use crate::flow::opened::Opened;
 use crate::flow::prescription::FromField;
 use crate::flow::seamless::SeamlessError;
-use crate::flow::signature::{Infeasible, Signature};
+use crate::flow::signature::{FULL_TURN, Infeasible, Signature};
 use crate::flow::straighten::StraightenError;
 use crate::flow::surface_delaunay::SurfaceDelaunay;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeId, VertexVec};
 use crate::geometry::triangle;
 use crate::observe::Observer;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
 
 /// Most Newton steps as long as features may be given up: those that can be met are met in fewer.
@@ -37,6 +37,8 @@ pub(super) fn flow(
     let c = surface.connectivity;
     let all = edges_of(from.features.iter());
     let mut is_held = vec![true; from.features.len()];
+    // Twice as many every time: at most about twice as many as need be, after few attempts.
+    let mut given_up = 1;
     loop {
         let held = || {
             let features = from.features.iter().zip(&is_held);
@@ -58,11 +60,6 @@ pub(super) fn flow(
             true => from.signature.clone(),
             false => without(from, &is_held, &on)?,
         };
-        let log_length = ground.on_symmetric(ground.log_length.clone());
-        let max_steps = match held().next() {
-            Some(_) => params.max_newton_steps.min(STEPS_WITH_FEATURES),
-            None => params.max_newton_steps,
-        };
         // The feature of every pair of sides.
         let features = from
             .features
@@ -71,31 +68,43 @@ pub(super) fn flow(
             .filter(|(i, _)| is_held[*i]);
         let owner = features.flat_map(|(i, f)| f.edges.iter().map(move |_| i));
         let (owner, glued): (Vec<usize>, _) = (owner.collect(), on.glued.concat());
-        let found = match solved(&on, &log_length, &signature, params, max_steps, observer) {
-            Ok(found) => {
-                let log_length = found.penner.iter().map(|l| 0.5 * l).collect();
-                with_lengths(&opened.connectivity, ground, &on, log_length, &glued)
-                    .map(|metric| (metric, found))
-            }
-            Err(error) => Err(error.into()),
+        let sought = Sought {
+            surface: &opened.connectivity,
+            ground,
+            on: &on,
+            signature: &signature,
         };
-        let (mut metric, found) = match found {
-            Ok(found) => found,
+        let found = match held().next() {
+            Some(_) => {
+                let max_steps = params.max_newton_steps.min(STEPS_WITH_FEATURES);
+                sought.from(&sought.log_length(), params, max_steps, observer)
+            }
+            None => {
+                let conformal = || conformal(surface, &signature, params, observer);
+                sought.without_features(params, conformal, observer)
+            }
+        };
+        let mut metric = match found {
+            Ok(metric) => metric,
             Err(error) => {
-                let Some(least) = is_held.iter().rposition(|held| *held) else {
+                let held = (0..is_held.len()).filter(|&i| is_held[i]);
+                let held: Vec<usize> = held.collect();
+                if held.is_empty() {
                     return Err(error);
-                };
+                }
                 let of_side = |edge: EdgeId| {
                     let side = glued.iter().position(|&e| e == edge)?;
                     owner.get(side / 2).copied()
                 };
-                let which = match &error {
+                let first = match &error {
                     FlowError::Seamless(SeamlessError::Stalled { missing, .. }) => {
-                        hardest(&from.features, &is_held, opened, missing)
+                        hardest(&from.features, held, opened, missing)
                     }
                     FlowError::Seamless(SeamlessError::NoLine { edge })
                     | FlowError::Lines(StraightenError::Bent { edge }) => {
-                        of_side(*edge).unwrap_or(least)
+                        let bent = of_side(*edge);
+                        let rest = held.into_iter().rev().filter(|i| Some(*i) != bent);
+                        bent.into_iter().chain(rest).collect()
                     }
                     FlowError::Lines(StraightenError::Correspondence(_))
                     | FlowError::Seamless(
@@ -103,52 +112,69 @@ pub(super) fn flow(
                         | SeamlessError::TooDense { .. }
                         | SeamlessError::Infeasible(_)
                         | SeamlessError::Solve(_),
-                    ) => least,
+                    ) => held.into_iter().rev().collect(),
                     _ => return Err(error),
                 };
-                is_held[which] = false;
+                for which in first.into_iter().take(given_up) {
+                    is_held[which] = false;
+                }
+                given_up *= 2;
                 continue;
             }
         };
-        let (features, is_held) = (from.features.iter(), is_held.iter());
-        let (lines, others): (Vec<_>, Vec<_>) = features.zip(is_held).partition(|(_, held)| **held);
+        let features = from.features.iter().zip(&is_held);
+        let (lines, others): (Vec<_>, Vec<_>) = features.partition(|(_, held)| **held);
         let cloned = |features: Vec<(&Feature, &bool)>| -> Vec<Feature> {
             features.into_iter().map(|(f, _)| f.clone()).collect()
         };
-        let met = QuarterTurns {
-            moved: from.moved,
-            lines: cloned(lines),
-            given_up: [cloned(others), from.crowded.clone()].concat(),
-            ..QuarterTurns::default()
-        };
-        if !met.lines.is_empty() {
+        if let Some(record) = &mut metric.quarter_turns {
+            record.moved = from.moved;
+            record.lines = cloned(lines);
+            record.given_up = [cloned(others), from.crowded.clone()].concat();
+        }
+        if held().next().is_some() {
             metric.log_scale = joined_scale(&metric.log_scale, opened, c.vertex_count());
             metric.curvature = joined_curvature(&metric.curvature, opened, c);
             metric.opened = Some(Box::new(opened.clone()));
         }
-        return Ok(recorded(metric, found, &signature, met));
+        return Ok(metric);
     }
 }
 
-/// The feature where most is missing; of equal ones the least important.
+/// The conformal metric with the cones of a signature; borders are straight between corners.
+fn conformal(
+    surface: Surface,
+    signature: &Signature,
+    params: &FlowParams,
+    observer: &dyn Observer,
+) -> Result<FlatMetric, FlowError> {
+    let c = surface.connectivity;
+    let of = |v| {
+        let quarters = FULL_TURN - signature.cone[v];
+        // The double of a border bends on both sides.
+        let sides = if c.is_boundary_vertex(v) { 2.0 } else { 1.0 };
+        quarters as f64 * FRAC_PI_2 / sides
+    };
+    let target = c.vertices().map(of).collect();
+    let prescribed = VertexVec::filled(true, c.vertex_count());
+    flipping::flow(surface, target, prescribed, params, observer)
+}
+
+/// Features in order of what is missing at their vertices, most first; of equal ones the least important first. `held`: by importance.
 fn hardest(
     features: &[Feature],
-    is_held: &[bool],
+    held: Vec<usize>,
     opened: &Opened,
     missing: &VertexVec<f64>,
-) -> usize {
+) -> Vec<usize> {
     let mut at = VertexVec::filled(0.0, opened.vertex.len());
     for (sector, &v) in opened.vertex.enumerate() {
         at[v] += missing[sector] * missing[sector];
     }
-    let (mut worst, mut most) = (is_held.iter().rposition(|held| *held).unwrap_or(0), 0.0);
-    for (which, feature) in features.iter().enumerate().filter(|(i, _)| is_held[*i]) {
-        let sum: f64 = feature.vertices.iter().map(|&v| at[v]).sum();
-        if sum >= most && sum > 0.0 {
-            (worst, most) = (which, sum);
-        }
-    }
-    worst
+    let sum = |i: usize| features[i].vertices.iter().map(|&v| at[v]).sum::<f64>();
+    let mut first: Vec<(f64, usize)> = held.into_iter().rev().map(|i| (sum(i), i)).collect();
+    first.sort_by(|a, b| b.0.total_cmp(&a.0));
+    first.into_iter().map(|(_, i)| i).collect()
 }
 
 /// The signature of a field on a surface where some features are not cut open.

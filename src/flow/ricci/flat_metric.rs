@@ -46,3 +46,13 @@ pub struct FlatMetric {
     /// Fit of the packing, for circle packings that have one.
     pub fit: Option<PackingFit>,
 }
+
+impl FlatMetric {
+    /// u at every vertex of the surface, or of its double where it has a boundary.
+    pub(super) fn scale(&self) -> &VertexVec<f64> {
+        match &self.intrinsic {
+            Some(intrinsic) => &intrinsic.u,
+            None => &self.log_scale,
+        }
+    }
+}

@@ -22,6 +22,7 @@ use crate::geometry::ids::{EdgeVec, VertexVec};
 use crate::observe::Observer;
 
 /// What flows.
+#[derive(Clone, Copy)]
 pub(super) struct Surface<'a> {
     pub(super) connectivity: &'a Connectivity,
     pub(super) source_length: &'a EdgeVec<f64>,

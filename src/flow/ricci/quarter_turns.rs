@@ -10,10 +10,10 @@
 
 use super::along_features;
 use super::error::FlowError;
-use super::flat_metric::{FlatMetric, QuarterTurns};
+use super::flat_metric::FlatMetric;
 use super::flipping::{self, Surface};
 use super::params::FlowParams;
-use super::seamless_metric::{recorded, solved, with_lengths};
+use super::seamless_metric::Sought;
 use crate::flow::delaunay::Delaunay;
 use crate::flow::looped::LoopedSurface;
 use crate::flow::prescription::{BoundaryCondition, Prescription};
@@ -67,11 +67,13 @@ fn with_cones(
         cone: ground.original.iter().map(doubled).collect(),
         turning: nearest_turning(&on, &log_length, &conformal),
     };
-    let max_steps = params.max_newton_steps;
-    let found = solved(&on, &log_length, &signature, params, max_steps, observer)?;
-    let log_length = found.penner.iter().map(|l| 0.5 * l).collect();
-    let metric = with_lengths(c, &ground, &on, log_length, &[])?;
-    Ok(recorded(metric, found, &signature, QuarterTurns::default()))
+    let sought = Sought {
+        surface: c,
+        ground: &ground,
+        on: &on,
+        signature: &signature,
+    };
+    sought.without_features(params, || Ok(conformal), observer)
 }
 
 /// Curvatures in quarter turns.
@@ -93,11 +95,7 @@ fn nearest_turning(
     log_length: &EdgeVec<f64>,
     conformal: &FlatMetric,
 ) -> Vec<i64> {
-    let u = match &conformal.intrinsic {
-        Some(intrinsic) => &intrinsic.u,
-        None => &conformal.log_scale,
-    };
-    let turned = turning_at(on, log_length, u);
+    let turned = turning_at(on, log_length, conformal.scale());
     let turned = turned.iter().enumerate().map(|(of, turned)| {
         let crosses = |h| {
             on.reflection()
@@ -129,6 +127,7 @@ fn turning_at(on: &LoopedSurface, log_length: &EdgeVec<f64>, u: &VertexVec<f64>)
 
 #[cfg(test)]
 mod tests {
+    use super::super::seamless_metric::with_lengths;
     use super::super::{Holonomy, flow as run, shapes};
     use super::*;
     use crate::flow::holonomy::homology_basis;
@@ -161,6 +160,22 @@ mod tests {
         }
     }
 
+    /// An annulus with obtuse corners opposite the border, where the Delaunay triangulation of its double crosses the mirror.
+    fn obtuse_at_the_border() -> shapes::Shape {
+        let mut shape = shapes::sheet(9, true);
+        let c = &shape.connectivity;
+        for h in c.halfedges().filter(|&h| c.twin(h).is_none()) {
+            let others = [c.next(h), c.prev(h)].map(|h| c.edge(h));
+            if others.iter().all(|&e| !c.is_boundary_edge(e)) {
+                let sum: f64 = others.iter().map(|&e| shape.length[e]).sum();
+                shape.length[c.edge(h)] = 0.97 * sum;
+            }
+        }
+        let ground = SurfaceDelaunay::new(&shape.connectivity, &shape.length).unwrap();
+        assert!(!ground.symmetric.unwrap().flips.is_empty());
+        shape
+    }
+
     /// Where lengths change by a scale, everything is as the conformal flow leaves it.
     #[test]
     fn a_conformal_change_is_that_of_the_conformal_flow() {
@@ -169,6 +184,7 @@ mod tests {
             shapes::torus(9, 7),
             shapes::plate(2, 2),
             shapes::sheet(9, true),
+            obtuse_at_the_border(),
         ] {
             let (c, length) = (&shape.connectivity, &shape.length);
             let prescription = match c.is_closed() {

@@ -1,6 +1,6 @@
 //! From lengths found by Newton's method on all edges to a [`FlatMetric`], whatever was prescribed.
 //!
-//! *Enters:* a triangulation with loops and a signature; then lengths on B. *Leaves:* a [`SeamlessMetric`]; a [`FlatMetric`] like that of the conformal flow, with the scale that
+//! *Enters:* a triangulation with loops and a signature. *Leaves:* a [`FlatMetric`] like that of the conformal flow, with the scale that
 //! comes nearest to it. *Guaranteed:* borders and features are edges of C, so nothing crosses them, but for borders beside faces without width.
 
 use super::error::FlowError;
@@ -11,9 +11,7 @@ use crate::flow::delaunay::Delaunay;
 use crate::flow::looped::LoopedSurface;
 use crate::flow::scale::at_unit_scale;
 use crate::flow::schemes::FaceShape;
-use crate::flow::seamless::{
-    SeamlessError, SeamlessMetric, SeamlessParams, SeamlessStep, Start, seamless,
-};
+use crate::flow::seamless::{SeamlessError, SeamlessParams, SeamlessStep, Start, seamless};
 use crate::flow::signature::Signature;
 use crate::flow::step::FlowStep;
 use crate::flow::straighten::{StraightenError, straighten};
@@ -27,48 +25,91 @@ use std::f64::consts::TAU;
 /// Most Newton steps: metrics that exist are met in far fewer.
 const MOST_STEPS: usize = 100;
 
-/// Newton's method, in `max_steps` steps at the most.
-pub(super) fn solved(
-    on: &LoopedSurface,
-    log_length: &EdgeVec<f64>,
-    signature: &Signature,
-    params: &FlowParams,
-    max_steps: usize,
-    observer: &dyn Observer,
-) -> Result<SeamlessMetric, SeamlessError> {
-    let start = Start {
-        connectivity: on.connectivity,
-        length: &on.length,
-        log_length: Some(log_length),
-        reflection: on.reflection(),
-        glued: &on.glued,
-    };
-    let params = SeamlessParams {
-        tolerance: params.curvature_tolerance,
-        conformality: params.conformality,
-        max_steps: max_steps.min(MOST_STEPS),
-    };
-    seamless(&start, &on.loops, signature, &params, observer)
+/// What a metric is sought on: a surface, or what is left of it along features, with its Delaunay triangulation, its loops and what they shall turn by.
+#[derive(Clone, Copy)]
+pub(super) struct Sought<'a> {
+    pub(super) surface: &'a Connectivity,
+    pub(super) ground: &'a SurfaceDelaunay,
+    pub(super) on: &'a LoopedSurface<'a>,
+    pub(super) signature: &'a Signature,
 }
 
-/// The metric with the record of how it was found.
-pub(super) fn recorded(
-    mut metric: FlatMetric,
-    found: SeamlessMetric,
-    signature: &Signature,
-    met: QuarterTurns,
-) -> FlatMetric {
-    metric.history = found.history.iter().map(line).collect();
-    metric.max_curvature_error = found.max_error;
-    if let Some(record) = &mut metric.quarter_turns {
-        let turns = signature.turning.iter().copied();
-        **record = QuarterTurns {
-            loops: turns.zip(found.residual).collect(),
-            conformal_error: record.conformal_error,
-            ..met
-        };
+impl Sought<'_> {
+    /// ln of the lengths of the surface's own metric on the triangulation of the loops (Penner coordinates).
+    pub(super) fn log_length(&self) -> EdgeVec<f64> {
+        self.ground.on_symmetric(self.ground.log_length.clone())
     }
-    metric
+
+    /// The metric that Newton's method finds from Penner coordinates, in `max_steps` steps at the most.
+    pub(super) fn from(
+        &self,
+        log_length: &EdgeVec<f64>,
+        params: &FlowParams,
+        max_steps: usize,
+        observer: &dyn Observer,
+    ) -> Result<FlatMetric, FlowError> {
+        let on = self.on;
+        let start = Start {
+            connectivity: on.connectivity,
+            length: &on.length,
+            log_length: Some(log_length),
+            reflection: on.reflection(),
+            glued: &on.glued,
+        };
+        let params = SeamlessParams {
+            tolerance: params.curvature_tolerance,
+            conformality: params.conformality,
+            max_steps: max_steps.min(MOST_STEPS),
+        };
+        let found = seamless(&start, &on.loops, self.signature, &params, observer)?;
+        let log_length = found.penner.iter().map(|l| 0.5 * l).collect();
+        let lines = on.glued.as_flattened();
+        let mut metric = with_lengths(self.surface, self.ground, on, log_length, lines)?;
+        metric.history = found.history.iter().map(line).collect();
+        metric.max_curvature_error = found.max_error;
+        if let Some(record) = &mut metric.quarter_turns {
+            let turns = self.signature.turning.iter().copied();
+            record.loops = turns.zip(found.residual).collect();
+        }
+        Ok(metric)
+    }
+
+    /// The same where no features are lines: from the surface's own metric and, where Newton does not arrive from there, from the `conformal` one with these cones. That one exists
+    /// always, and turnings alone are left to change from there; where there are no loops, it is what is sought.
+    pub(super) fn without_features(
+        &self,
+        params: &FlowParams,
+        conformal: impl FnOnce() -> Result<FlatMetric, FlowError>,
+        observer: &dyn Observer,
+    ) -> Result<FlatMetric, FlowError> {
+        let max_steps = params.max_newton_steps;
+        let own = self.log_length();
+        match self.from(&own, params, max_steps, observer) {
+            Err(
+                FlowError::Seamless(
+                    SeamlessError::Stalled { .. }
+                    | SeamlessError::BrokenFaces { .. }
+                    | SeamlessError::TooDense { .. }
+                    | SeamlessError::Solve(_),
+                )
+                | FlowError::Lines(_),
+            ) => {
+                let mut conformal = conformal()?;
+                if self.signature.turning.is_empty() {
+                    conformal.quarter_turns = Some(Box::default());
+                    return Ok(conformal);
+                }
+                let (c, u) = (self.on.connectivity, conformal.scale());
+                let scaled = |(e, l): (EdgeId, &f64)| {
+                    let [i, j] = c.edge_vertices(e);
+                    l + 0.5 * (u[i] + u[j])
+                };
+                let scaled = own.enumerate().map(scaled).collect();
+                self.from(&scaled, params, max_steps, observer)
+            }
+            result => result,
+        }
+    }
 }
 
 /// The metric that the triangulation of loops has with other lengths (natural logarithms, Penner coordinates), whose Delaunay triangulation must be flat but for cones, and

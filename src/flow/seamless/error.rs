@@ -64,10 +64,10 @@ pub enum SeamlessError {
     },
     /// The Jacobian is far from sparse.
     #[error(
-        "on this mesh the angles depend on lengths that are far away, by {products} products in the linear system (most: {most}), since very many long thin faces lie side by side: divide the long faces, or remesh the surface with faces of similar sides"
+        "on this mesh the angles depend on lengths that are far away, by at least {products} products in the linear system (most: {most}), since very many long thin faces lie side by side: divide the long faces, or remesh the surface with faces of similar sides"
     )]
     TooDense {
-        /// Products of entries.
+        /// Products of entries, as far as they were counted.
         products: usize,
         /// How many there may be.
         most: usize,

@@ -8,9 +8,20 @@
 //! depend on λ by the rows of T: the unit row where an edge was never flipped, else d λ_dc = −d λ_ab + w (d λ_ad + d λ_bc) + (1 − w)(d λ_ca + d λ_db)
 //! one flip after another; after flips that keep the metric likewise, with other factors.
 
+use super::SeamlessError;
 use super::state::{Problem, State};
 use crate::flow::delaunay::PtolemyFlip;
 use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, Id, IdVec, NONE};
+
+/// Most products for each edge, of entries of T one flip after another or of the Jacobian by its transpose; ordinary meshes have about ten.
+const MOST_PRODUCTS_OF_EDGE: usize = 60;
+/// So many are allowed whatever the number of edges: less than half a gigabyte.
+const ALLOWED_PRODUCTS: usize = 20_000_000;
+
+/// Most products on a surface of so many edges.
+pub(super) fn most_products(edges: usize) -> usize {
+    (MOST_PRODUCTS_OF_EDGE * edges).max(ALLOWED_PRODUCTS)
+}
 
 /// A sparse matrix by columns; no row occurs twice in a column.
 #[derive(Clone, Debug, Default)]
@@ -110,10 +121,10 @@ impl Collector {
 
 impl State {
     /// ∂(angles)/∂λ: a column an edge of the given triangulation.
-    pub(super) fn by_edges(&self, problem: &Problem) -> Columns {
+    pub(super) fn by_edges(&self, problem: &Problem) -> Result<Columns, SeamlessError> {
         let c = &self.connectivity;
         let edges = c.edge_count();
-        let flipped = FlippedRows::new(self, edges);
+        let flipped = FlippedRows::new(self, edges)?;
         let side = self.sides_of_features(problem);
         let (first, dependent) = flipped.by_edge(edges);
         let mut columns = Columns::with_capacity(edges, 4 * edges + edges / 2);
@@ -133,7 +144,7 @@ impl State {
             }
             columns.close(&mut collector);
         }
-        columns
+        Ok(columns)
     }
 
     /// ∂(angles)/∂u for a scale u at every vertex: a column a vertex.
@@ -262,7 +273,9 @@ fn images<I: Id>(shares: &IdVec<I, I>) -> IdVec<I, Option<I>> {
 }
 
 impl FlippedRows {
-    fn new(state: &State, edges: usize) -> Self {
+    fn new(state: &State, edges: usize) -> Result<Self, SeamlessError> {
+        let most = most_products(edges);
+        let mut products = 0;
         let mut rows = Self {
             number: EdgeVec::filled(NONE, edges),
             edge: Vec::new(),
@@ -282,6 +295,7 @@ impl FlippedRows {
                 match rows.number[e] {
                     NONE => collector.add(i, e.raw(), share),
                     n => {
+                        products += rows.row[n as usize].len();
                         for &(on, value) in &rows.row[n as usize] {
                             collector.add(i, on, share * value);
                         }
@@ -301,8 +315,11 @@ impl FlippedRows {
                 }
                 n => rows.row[n as usize] = row,
             }
+            if products > most {
+                return Err(SeamlessError::TooDense { products, most });
+            }
         }
-        rows
+        Ok(rows)
     }
 
     /// Which flipped edges depend on an edge, and how: entries `first[e]..first[e + 1]` for the edge e.

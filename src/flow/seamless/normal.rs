@@ -4,7 +4,7 @@
 //! loop is coupled with all vertices near it. So the loops come last in the elimination: rows that are long but few do not fill the rest.
 
 use super::SeamlessError;
-use super::jacobian::Columns;
+use super::jacobian::{Columns, most_products};
 use super::norm::Norm;
 use super::state::{Problem, State};
 use crate::flow::solve::SymmetricSolver;
@@ -12,11 +12,6 @@ use crate::geometry::ids::{EdgeId, EdgeVec, VertexId};
 
 /// Shifts of the diagonal, relative to its mean, tried in turn until the matrix is positive definite.
 const SHIFTS: [f64; 4] = [1e-14, 1e-12, 1e-10, 1e-8];
-
-/// Most products of entries of the Jacobian for each edge; ordinary meshes have about ten.
-const MOST_PRODUCTS_OF_EDGE: usize = 60;
-/// So many are allowed whatever the number of edges: less than half a gigabyte.
-const ALLOWED_PRODUCTS: usize = 20_000_000;
 
 /// The system at one λ.
 pub(super) struct Normal {
@@ -48,7 +43,7 @@ impl Normal {
         last: Option<Self>,
     ) -> Result<Self, SeamlessError> {
         let equations = problem.equations();
-        let by_edges = state.by_edges(problem);
+        let by_edges = state.by_edges(problem)?;
         let by_scales = norm.vertex.as_ref();
         let by_scales = by_scales.map(|_| state.by_scales(problem, &by_edges));
         check_density(&by_edges, problem.base.edge_count())?;
@@ -127,7 +122,7 @@ impl Normal {
 fn check_density(by_edges: &Columns, edges: usize) -> Result<(), SeamlessError> {
     let rows = (0..by_edges.count()).map(|c| by_edges.column(c).0.len());
     let products: usize = rows.map(|n| n * n / 2).sum();
-    let most = (MOST_PRODUCTS_OF_EDGE * edges).max(ALLOWED_PRODUCTS);
+    let most = most_products(edges);
     match products > most {
         true => Err(SeamlessError::TooDense { products, most }),
         false => Ok(()),

@@ -143,7 +143,7 @@ fn the_jacobian_of_symmetric_changes_agrees_with_finite_differences() {
         let penner = reflection.symmetric(&disturbed(&bounded.penner(), 0.8, &mut random));
         let state = problem.evaluate(&penner);
         assert!(state.flips.len() > 20);
-        let jacobian = state.by_edges(&problem);
+        let jacobian = state.by_edges(&problem).unwrap();
         let edges = on.connectivity.edges().step_by(7);
         let edges = edges.map(|e| problem.shares[e]);
         assert_derivatives(&problem, &jacobian, edges, |e, step| {

@@ -149,7 +149,7 @@ fn the_jacobian_with_features_agrees_with_finite_differences() {
         let state = problem.evaluate(&penner);
         assert!(state.max_error.is_finite());
         straightened += state.straightened.len();
-        let jacobian = state.by_edges(&problem);
+        let jacobian = state.by_edges(&problem).unwrap();
         let edges = on.connectivity.edges().step_by(3);
         let edges = edges.map(|e| problem.shares[e]);
         assert_derivatives(&problem, &jacobian, edges, |e, step| {
