@@ -8,6 +8,7 @@ mod real_models;
 
 use libtest_mimic::{Arguments, Failed, Trial};
 use real_models::lines::lines;
+use real_models::plates::{obj, rounded};
 use real_models::watertight::watertight;
 use real_models::{CLEAN, LARGE, atlases, checked, comparable, succeed};
 use std::path::{Path, PathBuf};
@@ -73,6 +74,10 @@ fn main() {
         }
         let run = move |corpus: &Path| seamless(&corpus.join(file), genus, loops);
         add(format!("seamless/{file}"), is_large, Box::new(run));
+    }
+    for genus in [5, 24, 47, 100] {
+        let run = move |_: &Path| seamless_plate(genus);
+        add(format!("seamless/genus{genus}"), false, Box::new(run));
     }
     for (file, curvature) in [
         ("brezel.obj", "-4"),
@@ -228,6 +233,14 @@ fn seamless(model: &Path, genus: usize, loops: usize) -> Result<(), Failed> {
         return Err(format!("{lines:?} are on lines").into());
     }
     Ok(checked(&atlas, comparable(model), Some(cones))?)
+}
+
+/// The same on generated surfaces of higher genus.
+fn seamless_plate(genus: usize) -> Result<(), Failed> {
+    let folder = tempfile::tempdir()?;
+    let model = folder.path().join(format!("genus{genus}.obj"));
+    std::fs::write(&model, obj(&rounded(genus)))?;
+    seamless(&model, genus, 0)
 }
 
 /// Fig. 8, 20 and 21: all curvature at one vertex.

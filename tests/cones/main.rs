@@ -131,10 +131,6 @@ fn main() {
             trials.push(trial(name, here(), case));
         }
     }
-    for genus in [5, 24, 47, 100] {
-        let case = move |_: &Path| genus::quarter_turns(genus);
-        trials.push(trial(format!("quarter-turns/{genus}"), here(), case));
-    }
     for shape in optimality::SHAPES {
         let case = move |_: &Path| optimality::brute_force(shape);
         trials.push(trial(format!("optimality/{shape:?}"), here(), case));

@@ -4,6 +4,7 @@
 #![allow(dead_code)]
 
 pub mod lines;
+pub mod plates;
 pub mod watertight;
 
 use std::path::{Path, PathBuf};
