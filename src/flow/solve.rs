@@ -283,6 +283,10 @@ impl SymmetricSolver {
         }
         for block in rhs.chunks_mut(BLOCK * self.size) {
             let columns = block.len() / self.size;
+            if columns == 1 {
+                self.solve_alone(block);
+                continue;
+            }
             LltRef::new(&self.symbolic, &self.factor).solve_in_place_with_conj(
                 Conj::No,
                 MatMut::from_column_major_slice_mut(

@@ -27,7 +27,7 @@ const FAST_SHARE: f64 = 0.1;
 /// The same after the tolerance is met, where rounding sets in.
 const POLISHING_SHARE: f64 = 0.5;
 /// Error below which no further step is tried, radians.
-const SETTLED: f64 = 1e-13;
+const SETTLED: f64 = 1e-12;
 
 /// When a factor serves for further steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -63,6 +63,19 @@ impl SymmetricSolver {
         Arch::new().dispatch(Alone { solver: self, side });
     }
 
+    /// Replaces one right side by the solution.
+    pub(super) fn solve_alone(&self, side: &mut [f64]) {
+        let Some(order) = self.symbolic.perm() else {
+            return self.solve_ordered(side);
+        };
+        let unknown = order.arrays().0;
+        let mut ordered: Vec<f64> = unknown.iter().map(|&u| side[u as usize]).collect();
+        self.solve_ordered(&mut ordered);
+        for (&u, x) in unknown.iter().zip(ordered) {
+            side[u as usize] = x;
+        }
+    }
+
     fn supernodes(&self) -> impl DoubleEndedIterator<Item = Supernode<'_>> {
         let raw = self.symbolic.raw();
         let count = match raw {
