@@ -74,6 +74,7 @@ pub mod export;
 pub mod fit;
 pub mod flow;
 pub mod geometry;
+pub mod grid;
 pub mod job;
 pub mod observe;
 pub mod outcome;

@@ -1,0 +1,272 @@
+//! The triangulation of a flat surface whose vertices are its cones and corners alone.
+//!
+//! *Enters:* an atlas whose transitions are quarter turns, as a [`Complex`]. *Leaves:* a complex of the same surface that has a vertex at every cone, corner, end and junction of lines,
+//! and hardly any other: about as many faces as there are cones, whatever the mesh. *Guaranteed:* lines (borders and features) are unions of sides; a piece without cones or corners
+//! keeps one vertex, and a closed line without corners too; every side but lines is Delaunay. *Not guaranteed:* that every flat vertex goes: one that is joined with itself stays, which harms nothing.
+//!
+//! A flat vertex is freed of edges by flips until three are left, and then its faces are one (the theorem behind it: flat surfaces with cones have Delaunay tessellations with exactly these
+//! vertices; Bobenko, Springborn 2007). On a line it is freed on both sides until its faces are two on each.
+
+use super::complex::{Complex, Side, turned};
+use super::error::GridError;
+use crate::geometry::connectivity::Connectivity;
+use crate::geometry::disjoint_sets::UnionFind;
+use crate::geometry::ids::{EdgeVec, FaceVec, HalfedgeId, HalfedgeVec, VertexId, VertexVec};
+use std::f64::consts::FRAC_PI_2;
+
+/// Rounds over the vertices that could not be taken out, as long as any can.
+const MOST_ROUNDS: usize = 8;
+/// Flips after a vertex is gone, to make its neighbourhood Delaunay again.
+const MOST_LOCAL_FLIPS: usize = 200;
+/// Flips in all that make the whole Delaunay, an edge: rounding may make both diagonals look wrong.
+const MOST_FLIPS_OF_EDGE: usize = 64;
+/// By how much an angle around a vertex may miss a multiple of a quarter turn, quarter turns.
+const NEARLY: f64 = 0.05;
+
+/// A surface on the plane: `uv` corners of faces, in one unit, such that sides that are glued differ by quarter turns and translations. `is_line`: edges that stay.
+pub fn complex(
+    c: &Connectivity,
+    uv: &FaceVec<[[f64; 2]; 3]>,
+    is_line: &EdgeVec<bool>,
+) -> Result<Complex, GridError> {
+    let vector = |h: HalfedgeId| {
+        let (uv, k) = (&uv[c.face(h)], c.corner(h));
+        let (p, q) = (uv[k], uv[(k + 1) % 3]);
+        [q[0] - p[0], q[1] - p[1]]
+    };
+    let mut sides = Vec::with_capacity(c.halfedge_count());
+    for h in c.halfedges() {
+        let (own, twin) = (vector(h), c.twin(h));
+        let turns = twin.map_or(0, |t| {
+            let beyond = vector(t);
+            // From −own to the vector of the twin.
+            let turn = (own[1] * beyond[0] - own[0] * beyond[1])
+                .atan2(-own[0] * beyond[0] - own[1] * beyond[1]);
+            (turn / FRAC_PI_2).round() as i64
+        });
+        sides.push(Side {
+            tail: c.tail(h),
+            vector: own,
+            twin,
+            turns: turns.rem_euclid(4) as u8,
+            is_line: is_line[c.edge(h)] || twin.is_none(),
+        });
+    }
+    let sides: HalfedgeVec<Side> = sides.into();
+    for (h, side) in sides.enumerate() {
+        let Some(t) = side.twin else { continue };
+        let there = turned(side.vector, side.turns);
+        let gap = (there[0] + sides[t].vector[0]).hypot(there[1] + sides[t].vector[1]);
+        let length = side.vector[0].hypot(side.vector[1]);
+        if !(gap <= NEARLY * length) || (side.turns + sides[t].turns) % 4 != 0 {
+            return Err(GridError::NoQuarterTurn {
+                edge: c.edge(h),
+                gap,
+            });
+        }
+    }
+    Ok(Complex::new(sides, c.vertex_count()))
+}
+
+/// Which vertices stay: all around which something is not flat or a line not straight. The angle around a vertex, or from line to line, in quarter turns must be whole.
+fn marked(complex: &Complex, vertices: usize) -> Result<VertexVec<bool>, GridError> {
+    let mut is_marked = VertexVec::filled(false, vertices);
+    for v in complex.vertices() {
+        let star = complex.star(v);
+        let is_border = complex.side(star[0]).twin.is_none();
+        // Angles between lines, from the first on.
+        let lines = star.iter().position(|&h| complex.side(h).is_line);
+        let order = star
+            .iter()
+            .cycle()
+            .skip(lines.unwrap_or(0))
+            .take(star.len());
+        let mut sectors: Vec<f64> = Vec::new();
+        for &h in order {
+            match sectors.last_mut() {
+                Some(angle) if !complex.side(h).is_line => *angle += complex.angle(h),
+                _ => sectors.push(complex.angle(h)),
+            }
+        }
+        let mut is_straight = true;
+        for angle in &sectors {
+            let quarters = angle / FRAC_PI_2;
+            if !((quarters - quarters.round()).abs() < NEARLY && quarters.round() >= 1.0) {
+                return Err(GridError::NoQuarterAngle {
+                    vertex: v,
+                    quarters,
+                });
+            }
+            let flat = if lines.is_some() { 2.0 } else { 4.0 };
+            is_straight &= quarters.round() == flat;
+        }
+        let wanted = match (lines, is_border) {
+            (None, _) | (_, true) => 1,
+            (Some(_), false) => 2,
+        };
+        is_marked[v] = !(is_straight && sectors.len() == wanted);
+    }
+    keep_one(complex, &mut is_marked);
+    Ok(is_marked)
+}
+
+/// Marks a vertex of every closed line and of every piece that have none.
+fn keep_one(complex: &Complex, is_marked: &mut VertexVec<bool>) {
+    for along_lines in [true, false] {
+        let mut joined = UnionFind::new(is_marked.len());
+        let mut is_met = VertexVec::filled(!along_lines, is_marked.len());
+        for h in complex
+            .sides()
+            .filter(|&h| !along_lines || complex.side(h).is_line)
+        {
+            let ends = [complex.side(h).tail, complex.head(h)];
+            joined.join(ends[0].index(), ends[1].index());
+            ends.iter().for_each(|&v| is_met[v] = true);
+        }
+        let mut has_one = VertexVec::filled(false, is_marked.len());
+        let vertices: Vec<VertexId> = complex.vertices().filter(|&v| is_met[v]).collect();
+        let mut root = |v: VertexId| VertexId::new(joined.find(v.index()));
+        for &v in vertices.iter().filter(|&&v| is_marked[v]) {
+            has_one[root(v)] = true;
+        }
+        for &v in &vertices {
+            let root = root(v);
+            if !has_one[root] {
+                has_one[root] = true;
+                is_marked[v] = true;
+            }
+        }
+    }
+}
+
+/// Takes out what is flat; see the module docs. Returns how many flat vertices stayed.
+pub fn reduce(complex: &mut Complex, vertices: usize) -> Result<usize, GridError> {
+    let is_marked = marked(complex, vertices)?;
+    make_delaunay(complex);
+    let mut left: Vec<VertexId> = complex.vertices().filter(|&v| !is_marked[v]).collect();
+    for _ in 0..MOST_ROUNDS {
+        let before = left.len();
+        left.retain(|&v| !take_out(complex, v));
+        make_delaunay(complex);
+        if left.is_empty() || left.len() == before {
+            break;
+        }
+    }
+    Ok(left.len())
+}
+
+/// Frees a vertex of edges and takes it out; false where that cannot be done now.
+fn take_out(complex: &mut Complex, v: VertexId) -> bool {
+    loop {
+        let star = complex.star(v);
+        if star
+            .iter()
+            .any(|&h| complex.head(h) == v || complex.side(complex.prev(h)).tail == v)
+        {
+            return false;
+        }
+        let is_border = complex.side(star[0]).twin.is_none();
+        let lines = star.iter().filter(|&&h| complex.side(h).is_line).count();
+        let is_done = match (is_border, lines) {
+            (true, _) => star.len() == 2,
+            (false, 0) => star.len() == 3,
+            (false, _) => {
+                let opposite =
+                    |i: usize| complex.side(star[i]).is_line && complex.side(star[i + 2]).is_line;
+                star.len() == 4 && (opposite(0) || opposite(1))
+            }
+        };
+        if is_done {
+            let done = match (is_border, lines) {
+                (true, _) => complex.merge_on_border(v),
+                (false, 0) => complex.merge_inside(v),
+                (false, _) => complex.merge_on_line(v),
+            };
+            if done {
+                let left: Vec<HalfedgeId> = star
+                    .iter()
+                    .flat_map(|&h| (0..3).map(move |k| HalfedgeId::new(h.index() / 3 * 3 + k)))
+                    .filter(|&h| complex.is_left(h))
+                    .collect();
+                flip_from(complex, left, MOST_LOCAL_FLIPS);
+            }
+            return done;
+        }
+        let Some(h) = best_flip(complex, &star, is_border, lines) else {
+            return false;
+        };
+        complex.flip(h);
+    }
+}
+
+/// The edge of a vertex to be flipped: that with the smallest angle beyond, among those that leave enough on each side of a line.
+fn best_flip(
+    complex: &Complex,
+    star: &[HalfedgeId],
+    is_border: bool,
+    lines: usize,
+) -> Option<HalfedgeId> {
+    let inner = |h: HalfedgeId| !complex.side(h).is_line;
+    // Inner edges between one line and the next: one must stay.
+    let mut count = vec![0usize; star.len()];
+    if is_border || lines > 0 {
+        let begin = star.iter().position(|&h| !inner(h)).unwrap_or(0);
+        let mut sector = Vec::new();
+        let close = |sector: &mut Vec<usize>, count: &mut Vec<usize>| {
+            let n = sector.len();
+            sector.drain(..).for_each(|i| count[i] = n);
+        };
+        for i in (0..star.len()).map(|i| (begin + i) % star.len()) {
+            match inner(star[i]) {
+                true => sector.push(i),
+                false => close(&mut sector, &mut count),
+            }
+        }
+        close(&mut sector, &mut count);
+    } else {
+        count.fill(usize::MAX);
+    }
+    let mut best: Option<(f64, HalfedgeId)> = None;
+    for (i, &h) in star.iter().enumerate() {
+        if !inner(h) || count[i] < 2 || !complex.is_convex(h) {
+            continue;
+        }
+        let Some(t) = complex.side(h).twin else {
+            continue;
+        };
+        let beyond = complex.angle(complex.next(h)) + complex.angle(t);
+        if best.is_none_or(|(least, _)| beyond < least) {
+            best = Some((beyond, h));
+        }
+    }
+    best.map(|(_, h)| h)
+}
+
+fn make_delaunay(complex: &mut Complex) {
+    let all: Vec<HalfedgeId> = complex.sides().collect();
+    let most = MOST_FLIPS_OF_EDGE * all.len();
+    flip_from(complex, all, most);
+}
+
+/// Flips sides that are not Delaunay, and those around them.
+fn flip_from(complex: &mut Complex, mut stack: Vec<HalfedgeId>, most: usize) {
+    let mut flips = 0;
+    while let Some(h) = stack.pop() {
+        if flips == most {
+            break;
+        }
+        if complex.side(h).is_line || !complex.is_wrong(h) {
+            continue;
+        }
+        let Some(t) = complex.side(h).twin else {
+            continue;
+        };
+        complex.flip(h);
+        flips += 1;
+        stack.extend(
+            [h, t]
+                .into_iter()
+                .flat_map(|h| [complex.next(h), complex.prev(h)]),
+        );
+    }
+}

@@ -1,0 +1,9 @@
+//! The integer grid on an atlas whose transitions are quarter turns: a unit square lattice whose points, lines and cells are the same whatever chart they are seen from.
+//!
+//! [`cone_triangulation`] leaves of the surface triangles between cones.
+
+pub mod complex;
+pub mod cone_triangulation;
+mod error;
+
+pub use error::GridError;
