@@ -43,6 +43,8 @@ pub struct Side {
     pub tail: VertexId,
     /// From there to its end, in the frame of its face.
     pub vector: [f64; 2],
+    /// The same on the lattice, cells; zero before the surface is quantised.
+    pub steps: [i64; 2],
     /// The side that it is glued to; `None` on the border.
     pub twin: Option<HalfedgeId>,
     /// A vector p of this face is p after so many quarter turns in the frame of the face beyond.
@@ -73,6 +75,26 @@ impl Complex {
             first,
             is_gone,
         }
+    }
+
+    /// The same without places of what is gone, and which vertex every vertex was.
+    pub fn compact(&self) -> (Self, VertexVec<VertexId>) {
+        let kept: VertexVec<VertexId> = self.vertices().collect();
+        let mut vertex = VertexVec::filled(0, self.first.len());
+        for (new, &old) in kept.enumerate() {
+            vertex[old] = new.index();
+        }
+        let mut place = HalfedgeVec::filled(0, self.side.len());
+        let sides: Vec<HalfedgeId> = self.sides().collect();
+        for (new, &old) in sides.iter().enumerate() {
+            place[old] = new;
+        }
+        let side = sides.iter().map(|&h| Side {
+            tail: VertexId::new(vertex[self.side[h].tail]),
+            twin: self.side[h].twin.map(|t| HalfedgeId::new(place[t])),
+            ..self.side[h]
+        });
+        (Self::new(side.collect(), kept.len()), kept)
     }
 
     /// One side.
@@ -126,6 +148,11 @@ impl Complex {
         left.map(|(v, _)| v)
     }
 
+    /// Number of places of sides, those of faces that are gone too.
+    pub fn places(&self) -> usize {
+        self.side.len()
+    }
+
     /// Whether the face of a side is left.
     pub fn is_left(&self, h: HalfedgeId) -> bool {
         !self.is_gone[h.index() / 3]
@@ -171,6 +198,7 @@ impl Complex {
         for k in 0..3 {
             let h = HalfedgeId::new(3 * f.index() + k);
             self.side[h].vector = turned(self.side[h].vector, turns);
+            self.side[h].steps = turned(self.side[h].steps, turns);
             self.side[h].turns = self.side[h].turns.wrapping_sub(turns) & 3;
             if let Some(t) = self.side[h].twin {
                 self.side[t].turns = self.side[t].turns.wrapping_add(turns) & 3;
@@ -234,17 +262,19 @@ impl Complex {
         let (hn, hp, tn, tp) = (self.next(h), self.prev(h), self.next(t), self.prev(t));
         let (c, d) = (self.side[hp].tail, self.side[tp].tail);
         let vector = add(self.side[tp].vector, self.side[hn].vector);
+        let [p, q] = [tp, hn].map(|h| self.side[h].steps);
+        let steps = [p[0] + q[0], p[1] + q[1]];
         self.moved(&[(hp, hn), (tn, hp), (tp, tn), (hn, tp)]);
-        let is_line = false;
-        let side = |tail, vector, twin| Side {
+        let side = |tail, vector, steps, twin| Side {
             tail,
             vector,
+            steps,
             twin: Some(twin),
             turns: 0,
-            is_line,
+            is_line: false,
         };
-        self.side[h] = side(d, vector, t);
-        self.side[t] = side(c, minus(vector), h);
+        self.side[h] = side(d, vector, steps, t);
+        self.side[t] = side(c, minus(vector), turned(steps, 2), h);
         for h in [h, hn, hp, t, tn, tp] {
             self.first[self.side[h].tail] = Some(h);
         }
@@ -261,6 +291,15 @@ impl Complex {
                 self.side[t].twin = Some(to);
             }
             self.side[to] = side;
+        }
+    }
+
+    /// Sets the steps of a side, and those of its twin.
+    pub fn set_steps(&mut self, h: HalfedgeId, steps: [i64; 2]) {
+        let Side { twin, turns, .. } = self.side[h];
+        self.side[h].steps = steps;
+        if let Some(t) = twin {
+            self.side[t].steps = turned(steps, turns + 2);
         }
     }
 
@@ -318,6 +357,7 @@ impl Complex {
         Side {
             tail: self.side[one].tail,
             vector: add(self.side[one].vector, self.side[other].vector),
+            steps: [0; 2],
             twin,
             turns: 0,
             is_line: true,

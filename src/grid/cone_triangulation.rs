@@ -47,6 +47,7 @@ pub fn complex(
         sides.push(Side {
             tail: c.tail(h),
             vector: own,
+            steps: [0; 2],
             twin,
             turns: turns.rem_euclid(4) as u8,
             is_line: is_line[c.edge(h)] || twin.is_none(),
@@ -139,8 +140,20 @@ fn keep_one(complex: &Complex, is_marked: &mut VertexVec<bool>) {
     }
 }
 
-/// Takes out what is flat; see the module docs. Returns how many flat vertices stayed.
-pub fn reduce(complex: &mut Complex, vertices: usize) -> Result<usize, GridError> {
+/// What is left of a surface.
+#[derive(Clone, Debug)]
+pub struct ConeTriangulation {
+    /// Triangles between cones.
+    pub complex: Complex,
+    /// Its vertices as vertices of the surface.
+    pub vertex: VertexVec<VertexId>,
+    /// How many of them are flat and could not be taken out.
+    pub flat: usize,
+}
+
+/// Takes out what is flat; see the module docs. `vertices`: those of the surface.
+pub fn reduce(mut complex: Complex, vertices: usize) -> Result<ConeTriangulation, GridError> {
+    let complex = &mut complex;
     let is_marked = marked(complex, vertices)?;
     make_delaunay(complex);
     let mut left: Vec<VertexId> = complex.vertices().filter(|&v| !is_marked[v]).collect();
@@ -152,7 +165,13 @@ pub fn reduce(complex: &mut Complex, vertices: usize) -> Result<usize, GridError
             break;
         }
     }
-    Ok(left.len())
+    let flat = left.len();
+    let (complex, vertex) = complex.compact();
+    Ok(ConeTriangulation {
+        complex,
+        vertex,
+        flat,
+    })
 }
 
 /// Frees a vertex of edges and takes it out; false where that cannot be done now.

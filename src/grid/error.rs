@@ -25,4 +25,9 @@ pub enum GridError {
         /// The angle, quarter turns.
         quarters: f64,
     },
+    /// No whole numbers were found.
+    #[error(
+        "no grid was found whose cells fit between the cones of the surface: ask for more cells, or for fewer cones (cones.count)"
+    )]
+    NoCells,
 }

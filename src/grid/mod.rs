@@ -1,9 +1,12 @@
 //! The integer grid on an atlas whose transitions are quarter turns: a unit square lattice whose points, lines and cells are the same whatever chart they are seen from.
 //!
-//! [`cone_triangulation`] leaves of the surface triangles between cones.
+//! [`cone_triangulation`] leaves of the surface triangles between cones; [`mod@quantise`] gives their sides whole numbers of cells.
 
 pub mod complex;
 pub mod cone_triangulation;
 mod error;
+pub mod lattice;
+pub mod quantise;
+mod walk;
 
 pub use error::GridError;
