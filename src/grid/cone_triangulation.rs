@@ -2,7 +2,7 @@
 //!
 //! *Enters:* an atlas whose transitions are quarter turns, as a [`Complex`]. *Leaves:* a complex of the same surface that has a vertex at every cone, corner, end and junction of lines,
 //! and hardly any other: about as many faces as there are cones, whatever the mesh. *Guaranteed:* lines (borders and features) are unions of sides; a piece without cones or corners
-//! keeps one vertex, and a closed line without corners too; every side but lines is Delaunay. *Not guaranteed:* that every flat vertex goes: one that is joined with itself stays, which harms nothing.
+//! keeps one vertex, and a closed line without corners too; every side but lines is Delaunay. *Not guaranteed:* that every flat vertex goes: one that stays joined with itself stays, which harms nothing.
 //!
 //! A flat vertex is freed of edges by flips until three are left, and then its faces are one (the theorem behind it: flat surfaces with cones have Delaunay tessellations with exactly these
 //! vertices; Bobenko, Springborn 2007). On a line it is freed on both sides until its faces are two on each.
@@ -178,15 +178,13 @@ pub fn reduce(mut complex: Complex, vertices: usize) -> Result<ConeTriangulation
 fn take_out(complex: &mut Complex, v: VertexId) -> bool {
     loop {
         let star = complex.star(v);
-        if star
-            .iter()
-            .any(|&h| complex.head(h) == v || complex.side(complex.prev(h)).tail == v)
-        {
-            return false;
-        }
         let is_border = complex.side(star[0]).twin.is_none();
         let lines = star.iter().filter(|&&h| complex.side(h).is_line).count();
+        let has_loop = star
+            .iter()
+            .any(|&h| complex.head(h) == v || complex.side(complex.prev(h)).tail == v);
         let is_done = match (is_border, lines) {
+            _ if has_loop => false,
             (true, _) => star.len() == 2,
             (false, 0) => star.len() == 3,
             (false, _) => {
@@ -211,16 +209,17 @@ fn take_out(complex: &mut Complex, v: VertexId) -> bool {
             }
             return done;
         }
-        let Some(h) = best_flip(complex, &star, is_border, lines) else {
+        let Some(h) = best_flip(complex, v, &star, is_border, lines) else {
             return false;
         };
         complex.flip(h);
     }
 }
 
-/// The edge of a vertex to be flipped: that with the smallest angle beyond, among those that leave enough on each side of a line.
+/// The edge of a vertex to be flipped: that with the smallest angle beyond, among those that leave it fewer edges, and enough on each side of a line.
 fn best_flip(
     complex: &Complex,
+    v: VertexId,
     star: &[HalfedgeId],
     is_border: bool,
     lines: usize,
@@ -253,6 +252,12 @@ fn best_flip(
         let Some(t) = complex.side(h).twin else {
             continue;
         };
+        // Where the vertex is joined with itself, it may get an edge for that which it loses.
+        let apexes = [complex.prev(h), complex.prev(t)].map(|h| complex.side(h).tail == v);
+        let gains = apexes.iter().filter(|is_own| **is_own).count();
+        if gains > usize::from(complex.head(h) == v) {
+            continue;
+        }
         let beyond = complex.angle(complex.next(h)) + complex.angle(t);
         if best.is_none_or(|(least, _)| beyond < least) {
             best = Some((beyond, h));

@@ -1,6 +1,6 @@
 //! Why a surface has no grid.
 
-use crate::geometry::ids::{EdgeId, VertexId};
+use crate::geometry::ids::{EdgeId, FaceId, VertexId};
 
 /// Why there is no grid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -30,4 +30,22 @@ pub enum GridError {
         "no grid was found whose cells fit between the cones of the surface: ask for more cells, or for fewer cones (cones.count)"
     )]
     NoCells,
+    /// A square of the lattice does not close: steps or gluings contradict each other.
+    #[error(
+        "the lattice does not close around point {at:?} of face {face} of the cone triangulation"
+    )]
+    Open {
+        /// Face of the cone triangulation.
+        face: FaceId,
+        /// Coordinates there.
+        at: [i64; 2],
+    },
+    /// There are fewer or more squares than area.
+    #[error("the lattice has {found} squares, but an area of {cells}")]
+    Quads {
+        /// Squares.
+        found: usize,
+        /// Area, cells.
+        cells: i64,
+    },
 }

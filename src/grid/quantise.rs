@@ -10,12 +10,12 @@ use super::complex::{Complex, turned};
 use super::error::GridError;
 use super::lattice::{Lattice, UNIT};
 use super::walk::{Entry, State, Walks};
-use crate::geometry::ids::{FaceId, HalfedgeId};
+use crate::geometry::ids::{FaceId, HalfedgeId, VertexVec};
 use std::collections::{BTreeMap, BinaryHeap};
 
-/// Rounds of mending in which nothing is gained, before it is tried at another size.
+/// Rounds of mending in which nothing is gained, before it is tried at a larger size.
 const MOST_STUCK: usize = 40;
-/// Factor on the size where faces cannot be mended: rounding matters less and less.
+/// Factor between sizes.
 const GROWTH: f64 = std::f64::consts::SQRT_2;
 const MOST_GROWTHS: usize = 24;
 /// Cost from which on walks are no longer followed where they are to lower E: each side costs about one.
@@ -30,50 +30,60 @@ const GAIN: f64 = 1e-9;
 const NO_LENGTH: f64 = 1000.0;
 /// The number of cells is mended by the size where it misses what is wanted by more than this part.
 const NEAR: f64 = 0.05;
-const MOST_SIZES: usize = 4;
+const MOST_SIZES: usize = 6;
 
 /// Steps for about as many cells as are wanted: as near as can be, but no fewer than the cones need.
 pub fn quantise(complex: &Complex, vertices: usize, cells: f64) -> Result<Lattice, GridError> {
     let area: f64 = complex.faces().map(|f| 0.5 * complex.double_area(f)).sum();
-    let mut scale = (cells / area).sqrt();
-    let mut best: Option<(f64, Lattice)> = None;
+    let wanted = (cells / area).sqrt();
+    let mut walks = Walks::default();
+    let mut lattice = first(complex, vertices, wanted, &mut walks)?;
+    let angles = Lattice::new(complex.clone(), wanted).angles(vertices, false);
+    // From where faces could be mended to where they are wanted: nothing is missing on the way.
+    lattice.settle(vertices, &angles, &mut walks);
+    while lattice.scale > wanted {
+        lattice.scale = (lattice.scale / GROWTH).max(wanted);
+        lattice.settle(vertices, &angles, &mut walks);
+    }
+    // Whole numbers may fall to one side: then the size is to blame.
+    let mut best = lattice.clone();
+    let miss = |lattice: &Lattice| (cells / lattice.cells() as f64).ln();
+    let (mut low, mut high) = (None, None);
     for _ in 0..MOST_SIZES {
-        let found = at_scale(complex, vertices, scale)?;
-        let ratio = cells / found.cells() as f64;
-        let miss = ratio.ln().abs();
-        if best.as_ref().is_none_or(|(least, _)| miss < *least) {
-            best = Some((miss, found));
+        let off = miss(&lattice);
+        if off.abs() < miss(&best).abs() {
+            best = lattice.clone();
         }
-        if miss < NEAR {
+        if off.abs() < NEAR {
             break;
         }
-        scale *= ratio.sqrt();
+        match off > 0.0 {
+            true => low = Some(lattice.scale),
+            false => high = Some(lattice.scale),
+        }
+        lattice.scale = match (low, high) {
+            (Some(low), Some(high)) => f64::sqrt(low * high),
+            _ => lattice.scale * (0.5 * off).exp(),
+        };
+        lattice.settle(vertices, &angles, &mut walks);
     }
-    let (_, lattice) = best.ok_or(GridError::NoCells)?;
-    Ok(lattice)
+    Ok(best)
 }
 
-/// Steps where a unit is `scale` cells, or more where faces cannot be mended.
-fn at_scale(complex: &Complex, vertices: usize, scale: f64) -> Result<Lattice, GridError> {
-    let mut scale = scale;
+/// Steps where nothing is missing, at a size as wanted or so much larger that faces can be mended: rounding matters less and less.
+fn first(
+    complex: &Complex,
+    vertices: usize,
+    wanted: f64,
+    walks: &mut Walks,
+) -> Result<Lattice, GridError> {
+    let mut scale = wanted;
     for _ in 0..MOST_GROWTHS {
         let mut lattice = Lattice::new(complex.clone(), scale);
         let angles = lattice.angles(vertices, false);
-        let mut walks = Walks::default();
         lattice.round();
         lattice.close()?;
-        if lattice.mend(&mut walks) && lattice.angles(vertices, true) == angles {
-            let mut last = lattice.clone();
-            for _ in 0..MOST_FLIP_ROUNDS {
-                lattice.improve(&mut walks);
-                if lattice.angles(vertices, true) != angles {
-                    return Ok(last);
-                }
-                last = lattice.clone();
-                if lattice.make_delaunay() == 0 {
-                    break;
-                }
-            }
+        if lattice.mend(walks) && lattice.angles(vertices, true) == angles {
             return Ok(lattice);
         }
         scale *= GROWTH;
@@ -225,9 +235,7 @@ impl Lattice {
                 if self.missing(f) == 0 {
                     continue;
                 }
-                let found = self.walks_of(f, walks);
-                let best = found.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-                if let Some((_, walk)) = best {
+                if let Some((_, walk)) = self.cheapest_walk(f, walks) {
                     let before = self.missing_on(&walk);
                     self.apply(&walk, 1);
                     match self.missing_on(&walk) < before {
@@ -262,12 +270,33 @@ impl Lattice {
         }
     }
 
-    /// The cheapest walks that begin with a side of a face.
+    /// The cheapest walk that begins with a side of a face.
+    fn cheapest_walk(&self, f: FaceId, walks: &mut Walks) -> Option<(f64, Vec<State>)> {
+        states_of(f).fold(None, |best: Option<(f64, Vec<State>)>, state| {
+            let most = best.as_ref().map_or(f64::INFINITY, |b| b.0);
+            self.walk(state, most, walks).or(best)
+        })
+    }
+
+    /// The cheapest walk of every state of a face.
     fn walks_of(&self, f: FaceId, walks: &mut Walks) -> Vec<(f64, Vec<State>)> {
-        let states = (0..12).map(|i| (HalfedgeId::new(3 * f.index() + i / 4), (i % 4) as u8));
-        states
-            .filter_map(|state| self.walk(state, f64::INFINITY, walks))
-            .collect()
+        let walk = |state| self.walk(state, f64::INFINITY, walks);
+        states_of(f).filter_map(walk).collect()
+    }
+
+    /// Lowers E by walks and flips; `angles` stay as they are.
+    fn settle(&mut self, vertices: usize, angles: &VertexVec<Vec<i64>>, walks: &mut Walks) {
+        for _ in 0..MOST_FLIP_ROUNDS {
+            let last = self.clone();
+            self.improve(walks);
+            if self.angles(vertices, true) != *angles {
+                *self = last;
+                return;
+            }
+            if self.make_delaunay() == 0 {
+                return;
+            }
+        }
     }
 
     /// Takes walks that lower E and let nothing be missing.
@@ -302,6 +331,11 @@ impl Lattice {
             }
         }
     }
+}
+
+/// Sides of a face, each in four directions.
+fn states_of(f: FaceId) -> impl Iterator<Item = State> {
+    (0..12).map(move |i| (HalfedgeId::new(3 * f.index() + i / 4), (i % 4) as u8))
 }
 
 /// The direction in which most is left.

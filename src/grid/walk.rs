@@ -128,7 +128,7 @@ impl Lattice {
         })
     }
 
-    /// The cheapest walk that begins with a state, with its cost; none that costs more than `most`.
+    /// The cheapest walk that begins with a state, with its cost; none that costs `most` or more.
     pub fn walk(&self, begin: State, most: f64, memory: &mut Walks) -> Option<(f64, Vec<State>)> {
         if !self.may_change(begin.0, begin.1) {
             return None;
@@ -208,7 +208,7 @@ impl Lattice {
                     continue;
                 };
                 let total = so_far + step;
-                if total > most || end.is_some_and(|(least, ..)| least <= total) {
+                if total >= most || end.is_some_and(|(least, ..)| least <= total) {
                     continue;
                 }
                 let side = complex.side(b);
