@@ -330,12 +330,11 @@ impl Complex {
         true
     }
 
-    /// Takes out a vertex of a line with two faces on each side, which become one on each side. The first of its sides is on the line.
-    pub fn merge_on_line(&mut self, v: VertexId) -> bool {
+    /// Takes out a vertex of a straight line with two faces on each side, which become one on each side. `first`: one of its sides that is on the line.
+    pub fn merge_on_line(&mut self, v: VertexId, first: HalfedgeId) -> bool {
         let mut star = self.star(v);
-        if star.len() == 4 && !self.side[star[0]].is_line {
-            star.rotate_left(1);
-        }
+        let begin = star.iter().position(|&h| h == first);
+        star.rotate_left(begin.unwrap_or(0));
         let [a, b, c, d] = star[..] else {
             return false;
         };
@@ -352,7 +351,7 @@ impl Complex {
         true
     }
 
-    /// Two sides one after the other as one, on a line.
+    /// Two sides one after the other as one.
     fn joined(&self, one: HalfedgeId, other: HalfedgeId, twin: Option<HalfedgeId>) -> Side {
         Side {
             tail: self.side[one].tail,
@@ -360,7 +359,7 @@ impl Complex {
             steps: [0; 2],
             twin,
             turns: 0,
-            is_line: true,
+            is_line: self.side[one].is_line,
         }
     }
 

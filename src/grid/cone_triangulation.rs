@@ -12,7 +12,7 @@ use super::error::GridError;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::disjoint_sets::UnionFind;
 use crate::geometry::ids::{EdgeVec, FaceVec, HalfedgeId, HalfedgeVec, VertexId, VertexVec};
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Rounds over the vertices that could not be taken out, as long as any can.
 const MOST_ROUNDS: usize = 8;
@@ -20,6 +20,8 @@ const MOST_ROUNDS: usize = 8;
 const MOST_LOCAL_FLIPS: usize = 200;
 /// Flips in all that make the whole Delaunay, an edge: rounding may make both diagonals look wrong.
 const MOST_FLIPS_OF_EDGE: usize = 64;
+/// By how much two sides may be off a straight line that are made one, radians.
+const STRAIGHT: f64 = 1e-9;
 /// By how much an angle around a vertex may miss a multiple of a quarter turn, quarter turns.
 const NEARLY: f64 = 0.05;
 
@@ -187,33 +189,57 @@ fn take_out(complex: &mut Complex, v: VertexId) -> bool {
             _ if has_loop => false,
             (true, _) => star.len() == 2,
             (false, 0) => star.len() == 3,
-            (false, _) => {
-                let opposite =
-                    |i: usize| complex.side(star[i]).is_line && complex.side(star[i + 2]).is_line;
-                star.len() == 4 && (opposite(0) || opposite(1))
-            }
+            (false, _) => straight(complex, &star).is_some(),
         };
         if is_done {
             let done = match (is_border, lines) {
                 (true, _) => complex.merge_on_border(v),
                 (false, 0) => complex.merge_inside(v),
-                (false, _) => complex.merge_on_line(v),
+                (false, _) => merge_straight(complex, v, &star),
             };
             if done {
-                let left: Vec<HalfedgeId> = star
-                    .iter()
-                    .flat_map(|&h| (0..3).map(move |k| HalfedgeId::new(h.index() / 3 * 3 + k)))
-                    .filter(|&h| complex.is_left(h))
-                    .collect();
-                flip_from(complex, left, MOST_LOCAL_FLIPS);
+                flip_around(complex, &star);
             }
             return done;
         }
-        let Some(h) = best_flip(complex, v, &star, is_border, lines) else {
-            return false;
+        match best_flip(complex, v, &star, is_border, lines) {
+            Some(h) => complex.flip(h),
+            // Its neighbours may be on a line with it, so that no flip leaves it.
+            None if has_loop || is_border || lines > 0 => return false,
+            None => {
+                let done = merge_straight(complex, v, &star);
+                if done {
+                    flip_around(complex, &star);
+                }
+                return done;
+            }
         };
-        complex.flip(h);
     }
+}
+
+/// Of four sides around a vertex, one that goes straight on with the side opposite; those of a line, where there is one.
+fn straight(complex: &Complex, star: &[HalfedgeId]) -> Option<HalfedgeId> {
+    let [a, b, c, d] = *star else { return None };
+    let pairs = [[a, b, c, d], [b, c, d, a]];
+    let has_line = star.iter().any(|&h| complex.side(h).is_line);
+    let is_straight = |[a, b, c, _]: &[HalfedgeId; 4]| match has_line {
+        true => complex.side(*a).is_line && complex.side(*c).is_line,
+        false => (complex.angle(*a) + complex.angle(*b) - PI).abs() < STRAIGHT,
+    };
+    pairs.iter().find(|p| is_straight(p)).map(|p| p[0])
+}
+
+fn merge_straight(complex: &mut Complex, v: VertexId, star: &[HalfedgeId]) -> bool {
+    straight(complex, star).is_some_and(|first| complex.merge_on_line(v, first))
+}
+
+/// Makes Delaunay what is left of the faces of a vertex that is gone.
+fn flip_around(complex: &mut Complex, star: &[HalfedgeId]) {
+    let sides = star
+        .iter()
+        .flat_map(|&h| (0..3).map(move |k| HalfedgeId::new(h.index() / 3 * 3 + k)));
+    let left: Vec<HalfedgeId> = sides.filter(|&h| complex.is_left(h)).collect();
+    flip_from(complex, left, MOST_LOCAL_FLIPS);
 }
 
 /// The edge of a vertex to be flipped: that with the smallest angle beyond, among those that leave it fewer edges, and enough on each side of a line.
