@@ -48,4 +48,10 @@ pub enum GridError {
         /// Area, cells.
         cells: i64,
     },
+    /// The lines from irregular points leave a region that is no rectangle.
+    #[error("the region around square {square} of the grid is no rectangle")]
+    NoRectangle {
+        /// A square there.
+        square: u32,
+    },
 }

@@ -35,6 +35,8 @@ pub struct QuadMesh {
     pub points: Vec<Point>,
     /// Corners of squares, counterclockwise.
     pub quads: Vec<[u32; 4]>,
+    /// Across side k of a square, from its corner k to the next: square and side there; `None` on the border.
+    pub across: Vec<[Option<(u32, u8)>; 4]>,
 }
 
 /// Where a point is in a face.
@@ -82,6 +84,9 @@ fn side(f: FaceId, k: usize) -> HalfedgeId {
     HalfedgeId::new(3 * f.index() + k)
 }
 
+/// Corners, and what is across sides.
+type Squares = (Vec<[u32; 4]>, Vec<[Option<(u32, u8)>; 4]>);
+
 /// Names of points that do not depend on the face they are seen from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Name {
@@ -116,7 +121,7 @@ impl Lattice {
             darts: Vec::new(),
         };
         extraction.list();
-        let quads = extraction.squares()?;
+        let (quads, across) = extraction.squares()?;
         if quads.len() as i64 != self.cells() {
             return Err(GridError::Quads {
                 found: quads.len(),
@@ -126,6 +131,7 @@ impl Lattice {
         Ok(QuadMesh {
             points: extraction.points,
             quads,
+            across,
         })
     }
 }
@@ -383,56 +389,57 @@ impl Extraction<'_> {
         Some((point, place))
     }
 
-    fn squares(&self) -> Result<Vec<[u32; 4]>, GridError> {
+    /// Squares, and what is across their sides.
+    fn squares(&self) -> Result<Squares, GridError> {
         let broken = |point: usize| GridError::Open {
             face: self.points[point].face,
             at: self.points[point].at,
         };
-        // From every dart the one that follows around the square on its left; none outside the border.
-        let mut next: Vec<Vec<Option<(u32, usize)>>> = Vec::with_capacity(self.darts.len());
+        // Numbers of darts, and of every dart the one that goes back.
+        let mut first = vec![0usize];
+        for darts in &self.darts {
+            first.push(first[first.len() - 1] + darts.len());
+        }
+        let mut back = Vec::with_capacity(first[self.darts.len()]);
+        let mut point_of = Vec::with_capacity(back.capacity());
         for (point, darts) in self.darts.iter().enumerate() {
-            let mut after = Vec::with_capacity(darts.len());
             for &dart in darts {
-                let back = self.trace(dart).and_then(|back| self.find(back));
-                let (end, place) = back.ok_or_else(|| broken(point))?;
-                let count = self.darts[end as usize].len();
-                let is_border = self.is_on_border(end as usize);
-                after.push(match place {
-                    0 if is_border => None,
-                    _ => Some((end, (place + count - 1) % count)),
-                });
+                let found = self.trace(dart).and_then(|back| self.find(back));
+                let (end, place) = found.ok_or_else(|| broken(point))?;
+                back.push(first[end as usize] + place);
+                point_of.push(point);
             }
-            next.push(after);
         }
+        // The dart that follows around the square on the left; none outside the border.
+        let next = |dart: usize| {
+            let back = back[dart];
+            let end = point_of[back];
+            match back - first[end] {
+                0 if self.is_on_border(end) => None,
+                0 => Some(first[end + 1] - 1),
+                _ => Some(back - 1),
+            }
+        };
         let mut quads = Vec::new();
-        for point in 0..self.darts.len() {
-            for place in 0..self.darts[point].len() {
-                let begin = (point as u32, place);
-                let mut at = begin;
-                let mut around = [begin; 4];
-                let mut is_outside = false;
-                for corner in &mut around {
-                    *corner = at;
-                    match next[at.0 as usize][at.1] {
-                        Some(after) => at = after,
-                        None => {
-                            is_outside = true;
-                            break;
-                        }
-                    }
+        let mut side: Vec<Option<(u32, u8)>> = vec![None; back.len()];
+        for begin in 0..back.len() {
+            let Some(b) = next(begin) else { continue };
+            let around = next(b).and_then(|c| Some([begin, b, c, next(c)?]));
+            let around = around.filter(|a| next(a[3]) == Some(begin));
+            let around = around.ok_or_else(|| broken(point_of[begin]))?;
+            if around.iter().min() == Some(&begin) {
+                for (k, dart) in around.into_iter().enumerate() {
+                    side[dart] = Some((quads.len() as u32, k as u8));
                 }
-                if is_outside {
-                    continue;
-                }
-                if at != begin {
-                    return Err(broken(point));
-                }
-                if around.iter().min() == Some(&begin) {
-                    quads.push(around.map(|c| c.0));
-                }
+                quads.push(around);
             }
         }
-        Ok(quads)
+        let across = quads
+            .iter()
+            .map(|q: &[usize; 4]| q.map(|dart| side[back[dart]]));
+        let across = across.collect();
+        let quads = quads.iter().map(|q| q.map(|dart| point_of[dart] as u32));
+        Ok((quads.collect(), across))
     }
 
     /// Whether the first dart of a point has nothing on its right.

@@ -1,8 +1,10 @@
 //! Cone triangulations and steps of surfaces whose grids are known.
 
+use super::blocks::{Blocks, Piece};
 use super::complex::Complex;
 use super::cone_triangulation::{ConeTriangulation, complex, reduce};
 use super::lattice::Lattice;
+use super::quads::QuadMesh;
 use super::quantise::quantise;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, VertexVec};
@@ -211,6 +213,10 @@ fn a_flat_torus_keeps_one_vertex() {
     assert_sound(&x.complex, 6.0);
     let lattice = quantise(&x.complex, 1, 24.0).unwrap();
     assert_eq!(lattice.cells(), 24);
+    assert_quads(
+        &lattice,
+        &Lattice::new(x.complex.clone(), 1.0).angles(1, false),
+    );
     assert!(lattice.energy_on(lattice.complex.sides()) < 1e-12);
 }
 
@@ -280,6 +286,81 @@ fn assert_quads(lattice: &Lattice, angles: &VertexVec<Vec<i64>>) {
     let euler = v as i64 - (inner / 2 + h - inner) as i64 + complex.faces().count() as i64;
     let found = mesh.points.len() as i64 - edges as i64 + mesh.quads.len() as i64;
     assert_eq!(found, euler);
+    assert_blocks(&mesh, euler);
+}
+
+/// Every square in one block, sides that agree from both sides, and no more blocks than lines can make.
+fn assert_blocks(mesh: &QuadMesh, euler: i64) {
+    let Blocks { blocks, sides } = mesh.blocks().unwrap();
+    let mut count = vec![0; mesh.quads.len()];
+    for block in &blocks {
+        assert_eq!(block.squares.len(), block.cells[0] * block.cells[1]);
+        block.squares.iter().for_each(|s| count[s.0 as usize] += 1);
+    }
+    assert!(count.iter().all(|&n| n == 1));
+    for (b, of_block) in sides.iter().enumerate() {
+        for (s, pieces) in of_block.iter().enumerate() {
+            let length: usize = pieces.iter().map(|p| p.length).sum();
+            assert_eq!(length, blocks[b].cells[s % 2]);
+            for piece in pieces {
+                let Some((c, t, start)) = piece.across else {
+                    continue;
+                };
+                let mirrored = Piece {
+                    start,
+                    length: piece.length,
+                    across: Some((b, s, piece.start)),
+                };
+                assert!(
+                    sides[c][t].contains(&mirrored),
+                    "{piece:?} {:?}",
+                    sides[c][t]
+                );
+            }
+        }
+    }
+    let mut is_border = vec![false; mesh.points.len()];
+    for (corners, across) in mesh.quads.iter().zip(&mesh.across) {
+        for k in (0..4).filter(|&k| across[k].is_none()) {
+            is_border[corners[k] as usize] = true;
+            is_border[corners[(k + 1) % 4] as usize] = true;
+        }
+    }
+    let lines = mesh
+        .points
+        .iter()
+        .zip(&is_border)
+        .map(|(p, border)| match border {
+            true => (p.valence as i64 - 3).max(0),
+            false if p.valence == 4 => 0,
+            false => p.valence as i64 - 1,
+        });
+    let most = lines.sum::<i64>() + euler;
+    assert!(
+        blocks.len() as i64 <= most.max(1),
+        "{} of {most}",
+        blocks.len()
+    );
+}
+
+/// An annulus has no corner and no irregular point: one line cuts it open.
+#[test]
+fn an_annulus_is_one_block() {
+    let square = |i: usize| {
+        let at = |a: usize, b: usize| [(i + a) as f64, b as f64, 0.0];
+        [at(0, 0), at(1, 0), at(1, 1), at(0, 1)]
+    };
+    let squares: Vec<_> = (0..4).map(square).collect();
+    let identify = |[x, y, z]: [i64; 3]| [x.rem_euclid(12), y, z];
+    let x = Squares::new(&squares, 3, identify, no_lines).reduced();
+    assert_eq!(
+        (x.vertex.len(), x.complex.faces().count(), x.flat),
+        (2, 2, 0)
+    );
+    let lattice = quantise(&x.complex, 2, 36.0).unwrap();
+    assert_grid(&lattice, &x);
+    let blocks = lattice.quads().unwrap().blocks().unwrap().blocks;
+    assert!(blocks.len() == 1 && lattice.cells() == 36);
 }
 
 #[test]

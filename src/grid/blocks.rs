@@ -1,0 +1,372 @@
+//! Rectangles of squares: the motorcycle graph of a quad mesh, with as few of its lines as that takes.
+//!
+//! *Enters:* a [`QuadMesh`]. *Leaves:* [`Block`]s, each a rectangle of squares, and what lies across their sides, square by square. *Guaranteed:* every square is in one block; irregular points are on the borders of
+//! blocks; T-junctions are harmless, since both sides have the same squares; the same blocks for the same mesh. *Not guaranteed:* the fewest.
+//!
+//! From every irregular point a line starts along each of its edges and goes straight on, all at the same speed, until it meets another line, an irregular point or the border; lines divide the surface into rectangles (Eppstein, Goodrich, Kim, Tamstorf 2008).
+//! Without irregular points a line or two are put where they are needed. Then two blocks that share a whole side of both become one, the longest sides first.
+
+use super::error::GridError;
+use super::quads::QuadMesh;
+use std::collections::BTreeMap;
+
+/// A rectangle of squares.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Block {
+    /// Squares along its first and second side.
+    pub cells: [usize; 2],
+    /// Row by row from the bottom: square, and which of its corners is at the bottom left.
+    pub squares: Vec<(u32, u8)>,
+}
+
+/// A stretch of a side with one neighbour, in squares, counterclockwise around the block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Piece {
+    /// First square of this side.
+    pub start: usize,
+    /// Squares.
+    pub length: usize,
+    /// Block, side and first square across, which is met last there; `None` on the border.
+    pub across: Option<(usize, usize, usize)>,
+}
+
+/// Blocks with their sides: bottom, right, top, left.
+#[derive(Clone, Debug)]
+pub struct Blocks {
+    /// Rectangles.
+    pub blocks: Vec<Block>,
+    /// Stretches of each of their sides.
+    pub sides: Vec<[Vec<Piece>; 4]>,
+}
+
+struct Walls<'a> {
+    mesh: &'a QuadMesh,
+    /// Of every square, its four sides.
+    is_wall: Vec<[bool; 4]>,
+}
+
+impl QuadMesh {
+    /// See the module docs.
+    pub fn blocks(&self) -> Result<Blocks, GridError> {
+        let on_border = self.across.iter().map(|a| a.map(|across| across.is_none()));
+        let mut walls = Walls {
+            mesh: self,
+            is_wall: on_border.collect(),
+        };
+        walls.race();
+        let mut blocks = walls.rectangles()?;
+        walls.join(&mut blocks)?;
+        let sides = walls.sides(&blocks)?;
+        Ok(Blocks { blocks, sides })
+    }
+
+    /// The side that goes on where one ends at a point with four edges.
+    fn straight_on(&self, (q, k): (u32, u8)) -> Option<(u32, u8)> {
+        let (q, k) = self.across[q as usize][usize::from((k + 1) & 3)]?;
+        Some((q, (k + 1) & 3))
+    }
+}
+
+impl Walls<'_> {
+    fn put(&mut self, (q, k): (u32, u8)) {
+        self.is_wall[q as usize][usize::from(k)] = true;
+        if let Some((q, k)) = self.mesh.across[q as usize][usize::from(k)] {
+            self.is_wall[q as usize][usize::from(k)] = true;
+        }
+    }
+
+    fn is(&self, q: u32, k: u8) -> bool {
+        self.is_wall[q as usize][usize::from(k & 3)]
+    }
+
+    /// Points on the border, and those where lines start.
+    fn kinds(&self) -> (Vec<bool>, Vec<bool>) {
+        let mesh = self.mesh;
+        let mut is_border = vec![false; mesh.points.len()];
+        for (corners, across) in mesh.quads.iter().zip(&mesh.across) {
+            for k in (0..4).filter(|&k| across[k].is_none()) {
+                is_border[corners[k] as usize] = true;
+                is_border[corners[(k + 1) % 4] as usize] = true;
+            }
+        }
+        let points = mesh.points.iter().zip(&is_border);
+        let starts = points.map(|(p, &border)| {
+            if border {
+                p.valence > 3
+            } else {
+                p.valence != 4
+            }
+        });
+        let starts = starts.collect();
+        (is_border, starts)
+    }
+
+    /// Lines from irregular points.
+    fn race(&mut self) {
+        let mesh = self.mesh;
+        let (is_border, starts) = self.kinds();
+        let mut is_met: Vec<bool> = is_border
+            .iter()
+            .zip(&starts)
+            .map(|(a, b)| *a || *b)
+            .collect();
+        let mut running: Vec<(u32, u8)> = Vec::new();
+        for (q, corners) in mesh.quads.iter().enumerate() {
+            for k in 0..4u8 {
+                let inner = mesh.across[q][usize::from(k)].is_some();
+                if inner && starts[corners[usize::from(k)] as usize] {
+                    running.push((q as u32, k));
+                }
+            }
+        }
+        while !running.is_empty() {
+            let mut next = Vec::with_capacity(running.len());
+            for (q, k) in running {
+                let was = self.is(q, k);
+                self.put((q, k));
+                let end = mesh.quads[q as usize][usize::from((k + 1) & 3)] as usize;
+                if was || std::mem::replace(&mut is_met[end], true) {
+                    continue;
+                }
+                next.extend(mesh.straight_on((q, k)));
+            }
+            running = next;
+        }
+    }
+
+    /// A whole line from a side on, both ways, as far as there are no walls.
+    fn line(&mut self, begin: (u32, u8)) {
+        let back = self.mesh.across[begin.0 as usize][usize::from(begin.1)];
+        for start in [Some(begin), back].into_iter().flatten() {
+            let mut at = start;
+            let mut is_first = true;
+            loop {
+                if self.is(at.0, at.1) && !std::mem::take(&mut is_first) {
+                    break;
+                }
+                is_first = false;
+                self.put(at);
+                // Both sides of a wall that is crossed end it.
+                if self.is_met_by_wall(at) {
+                    break;
+                }
+                match self.mesh.straight_on(at) {
+                    Some(next) => at = next,
+                    None => break,
+                }
+            }
+        }
+    }
+
+    /// Whether a wall crosses where a side ends.
+    fn is_met_by_wall(&self, (q, k): (u32, u8)) -> bool {
+        self.is(q, k + 1)
+    }
+
+    /// The block whose bottom left corner is a corner of a square; `None` where it is no rectangle.
+    fn rectangle(&self, corner: (u32, u8)) -> Option<Block> {
+        let mesh = self.mesh;
+        let row = |mut at: (u32, u8)| {
+            let mut row = vec![at];
+            while !self.is(at.0, at.1 + 1) && row.len() <= mesh.quads.len() {
+                let (q, k) = mesh.across[at.0 as usize][usize::from((at.1 + 1) & 3)]?;
+                at = (q, (k + 1) & 3);
+                row.push(at);
+            }
+            Some(row)
+        };
+        let mut squares = row(corner)?;
+        let width = squares.len();
+        let mut first = corner;
+        let mut height = 1;
+        while !self.is(first.0, first.1 + 2) {
+            first = mesh.across[first.0 as usize][usize::from((first.1 + 2) & 3)]?;
+            squares.extend(row(first)?);
+            height += 1;
+            if squares.len() != width * height || squares.len() > mesh.quads.len() {
+                return None;
+            }
+        }
+        let block = Block {
+            cells: [width, height],
+            squares,
+        };
+        // Walls all around, and none inside.
+        let is_whole = (0..height).all(|j| {
+            (0..width).all(|i| {
+                let (q, k) = block.squares[j * width + i];
+                let walls = [j == 0, i + 1 == width, j + 1 == height, i == 0];
+                (0..4).all(|s| self.is(q, k + s as u8) == walls[s])
+            })
+        });
+        is_whole.then_some(block)
+    }
+
+    /// All blocks, with lines put where a region has no corner.
+    fn rectangles(&mut self) -> Result<Vec<Block>, GridError> {
+        let mesh = self.mesh;
+        loop {
+            let mut is_taken = vec![false; mesh.quads.len()];
+            let mut blocks = Vec::new();
+            for q in 0..mesh.quads.len() as u32 {
+                for k in 0..4 {
+                    if is_taken[q as usize] || !(self.is(q, k) && self.is(q, k + 3)) {
+                        continue;
+                    }
+                    let block = self
+                        .rectangle((q, k))
+                        .ok_or(GridError::NoRectangle { square: q })?;
+                    block
+                        .squares
+                        .iter()
+                        .for_each(|s| is_taken[s.0 as usize] = true);
+                    blocks.push(block);
+                }
+            }
+            let Some(free) = is_taken.iter().position(|taken| !taken) else {
+                return Ok(blocks);
+            };
+            // A region that closes up: across it if it has a border, and both ways if not.
+            let region = self.region(free as u32);
+            let beside_wall = region
+                .iter()
+                .find_map(|&q| Some((q, (0..4).find(|&k| self.is(q, k))?)));
+            match beside_wall {
+                Some((q, k)) => self.line((q, (k + 1) & 3)),
+                None => {
+                    self.line((free as u32, 0));
+                    self.line((free as u32, 1));
+                }
+            }
+        }
+    }
+
+    /// Squares that no wall divides from one.
+    fn region(&self, begin: u32) -> Vec<u32> {
+        let mut is_met = vec![false; self.mesh.quads.len()];
+        is_met[begin as usize] = true;
+        let mut region = vec![begin];
+        let mut at = 0;
+        while at < region.len() {
+            let q = region[at];
+            for k in (0..4).filter(|&k| !self.is(q, k)) {
+                if let Some((next, _)) = self.mesh.across[q as usize][usize::from(k)]
+                    && !std::mem::replace(&mut is_met[next as usize], true)
+                {
+                    region.push(next);
+                }
+            }
+            at += 1;
+        }
+        region
+    }
+
+    /// Makes one of two blocks that share a whole side of both.
+    fn join(&mut self, blocks: &mut Vec<Block>) -> Result<(), GridError> {
+        loop {
+            let sides = self.sides(blocks)?;
+            // By length, then by block and side.
+            let mut best: Option<(usize, usize, usize)> = None;
+            for (b, of_block) in sides.iter().enumerate() {
+                for (s, pieces) in of_block.iter().enumerate() {
+                    let [
+                        Piece {
+                            length,
+                            across: Some((other, t, _)),
+                            ..
+                        },
+                    ] = pieces[..]
+                    else {
+                        continue;
+                    };
+                    let is_whole = other != b && sides[other][t].len() == 1;
+                    if is_whole && best.is_none_or(|(most, ..)| length > most) {
+                        best = Some((length, b, s));
+                    }
+                }
+            }
+            let Some((_, b, s)) = best else {
+                return Ok(());
+            };
+            let Some((other, ..)) = sides[b][s][0].across else {
+                return Ok(());
+            };
+            for (q, k) in side_of(&blocks[b], s) {
+                self.is_wall[q as usize][usize::from(k)] = false;
+                if let Some((q, k)) = self.mesh.across[q as usize][usize::from(k)] {
+                    self.is_wall[q as usize][usize::from(k)] = false;
+                }
+            }
+            let squares = [b, other].into_iter().flat_map(|b| &blocks[b].squares);
+            let mut turned = squares.flat_map(|&(q, k)| (0..4u8).map(move |i| (q, (k + i) & 3)));
+            let corner = turned.find(|&(q, k)| self.is(q, k) && self.is(q, k + 3));
+            let joined = corner.and_then(|corner| self.rectangle(corner));
+            let square = blocks[b].squares[0].0;
+            let joined = joined.ok_or(GridError::NoRectangle { square })?;
+            blocks[b.min(other)] = joined;
+            blocks.remove(b.max(other));
+        }
+    }
+
+    /// What lies across the sides of blocks.
+    fn sides(&self, blocks: &[Block]) -> Result<Vec<[Vec<Piece>; 4]>, GridError> {
+        // Block, side and number along it of every side of a square on the border of its block.
+        let mut along: BTreeMap<(u32, u8), (usize, usize, usize)> = BTreeMap::new();
+        for (b, block) in blocks.iter().enumerate() {
+            for s in 0..4 {
+                for (i, side) in side_of(block, s).into_iter().enumerate() {
+                    along.insert(side, (b, s, i));
+                }
+            }
+        }
+        let of = |block: &Block, s: usize| -> Result<Vec<Piece>, GridError> {
+            let mut pieces: Vec<Piece> = Vec::new();
+            for (i, (q, k)) in side_of(block, s).into_iter().enumerate() {
+                let across = match self.mesh.across[q as usize][usize::from(k)] {
+                    Some(there) => {
+                        let square = there.0;
+                        let missing = GridError::NoRectangle { square };
+                        Some(*along.get(&there).ok_or(missing)?)
+                    }
+                    None => None,
+                };
+                let goes_on = |piece: &Piece| match (piece.across, across) {
+                    (Some((b, s, last)), Some((c, t, at))) => (b, s) == (c, t) && at + 1 == last,
+                    (None, None) => true,
+                    _ => false,
+                };
+                match pieces.last_mut() {
+                    Some(piece) if goes_on(piece) => {
+                        piece.length += 1;
+                        piece.across = across;
+                    }
+                    _ => pieces.push(Piece {
+                        start: i,
+                        length: 1,
+                        across,
+                    }),
+                }
+            }
+            Ok(pieces)
+        };
+        let all = blocks
+            .iter()
+            .map(|block| Ok([of(block, 0)?, of(block, 1)?, of(block, 2)?, of(block, 3)?]));
+        all.collect()
+    }
+}
+
+/// Squares along a side of a block, counterclockwise, with their sides there.
+fn side_of(block: &Block, s: usize) -> Vec<(u32, u8)> {
+    let [w, h] = block.cells;
+    let at = |i: usize, j: usize| {
+        let (q, k) = block.squares[j * w + i];
+        (q, (k + s as u8) & 3)
+    };
+    match s {
+        0 => (0..w).map(|i| at(i, 0)).collect(),
+        1 => (0..h).map(|j| at(w - 1, j)).collect(),
+        2 => (0..w).rev().map(|i| at(i, h - 1)).collect(),
+        _ => (0..h).rev().map(|j| at(0, j)).collect(),
+    }
+}
