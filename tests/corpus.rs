@@ -7,6 +7,7 @@
 mod real_models;
 
 use libtest_mimic::{Arguments, Failed, Trial};
+use real_models::grids::grids;
 use real_models::lines::lines;
 use real_models::plates::{obj, rounded};
 use real_models::watertight::watertight;
@@ -74,6 +75,8 @@ fn main() {
         }
         let run = move |corpus: &Path| seamless(&corpus.join(file), genus, loops);
         add(format!("seamless/{file}"), is_large, Box::new(run));
+        let run = move |corpus: &Path| Ok(grids(&corpus.join(file))?);
+        add(format!("grid/{file}"), is_large, Box::new(run));
     }
     for genus in [5, 24, 47, 100] {
         let run = move |_: &Path| seamless_plate(genus);

@@ -113,7 +113,7 @@ impl Complex {
 
     /// The side before one in its face.
     pub fn prev(&self, h: HalfedgeId) -> HalfedgeId {
-        HalfedgeId::new(if h.index() % 3 == 0 {
+        HalfedgeId::new(if h.index().is_multiple_of(3) {
             h.index() + 2
         } else {
             h.index() - 1

@@ -61,7 +61,8 @@ pub fn complex(
         let there = turned(side.vector, side.turns);
         let gap = (there[0] + sides[t].vector[0]).hypot(there[1] + sides[t].vector[1]);
         let length = side.vector[0].hypot(side.vector[1]);
-        if !(gap <= NEARLY * length) || (side.turns + sides[t].turns) % 4 != 0 {
+        let is_quarter = gap <= NEARLY * length;
+        if !(is_quarter && (side.turns + sides[t].turns).is_multiple_of(4)) {
             return Err(GridError::NoQuarterTurn {
                 edge: c.edge(h),
                 gap,

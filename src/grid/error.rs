@@ -30,6 +30,20 @@ pub enum GridError {
         "no grid was found whose cells fit between the cones of the surface: ask for more cells, or for fewer cones (cones.count)"
     )]
     NoCells,
+    /// A number of cells that is no such number, or too many.
+    #[error("{cells} cells were asked for: a grid has from 1 to {most}")]
+    Cells {
+        /// What was asked for.
+        cells: f64,
+        /// Most that are made.
+        most: f64,
+    },
+    /// A face has no area on the lattice.
+    #[error("face {face} of the cone triangulation has no area on the lattice")]
+    NoArea {
+        /// Face of the cone triangulation.
+        face: FaceId,
+    },
     /// A square of the lattice does not close: steps or gluings contradict each other.
     #[error(
         "the lattice does not close around point {at:?} of face {face} of the cone triangulation"

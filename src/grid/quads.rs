@@ -114,6 +114,9 @@ impl Lattice {
 
     /// Points and squares; see the module docs.
     pub fn quads(&self) -> Result<QuadMesh, GridError> {
+        if let Some(face) = self.complex.faces().find(|&f| self.missing(f) > 0) {
+            return Err(GridError::NoArea { face });
+        }
         let mut extraction = Extraction {
             lattice: self,
             number: HashMap::new(),
@@ -422,11 +425,11 @@ impl Extraction<'_> {
         };
         let mut quads = Vec::new();
         let mut side: Vec<Option<(u32, u8)>> = vec![None; back.len()];
-        for begin in 0..back.len() {
+        for (begin, &point) in point_of.iter().enumerate() {
             let Some(b) = next(begin) else { continue };
             let around = next(b).and_then(|c| Some([begin, b, c, next(c)?]));
             let around = around.filter(|a| next(a[3]) == Some(begin));
-            let around = around.ok_or_else(|| broken(point_of[begin]))?;
+            let around = around.ok_or_else(|| broken(point))?;
             if around.iter().min() == Some(&begin) {
                 for (k, dart) in around.into_iter().enumerate() {
                     side[dart] = Some((quads.len() as u32, k as u8));

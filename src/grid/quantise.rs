@@ -13,6 +13,8 @@ use super::walk::{Entry, State, Walks};
 use crate::geometry::ids::{FaceId, HalfedgeId, VertexVec};
 use std::collections::{BTreeMap, BinaryHeap};
 
+/// Most cells: squares of steps stay far within 64 bits.
+const MOST_CELLS: f64 = 1e8;
 /// Rounds of mending in which nothing is gained, before it is tried at a larger size.
 const MOST_STUCK: usize = 40;
 /// Factor between sizes.
@@ -34,6 +36,11 @@ const MOST_SIZES: usize = 6;
 
 /// Steps for about as many cells as are wanted: as near as can be, but no fewer than the cones need.
 pub fn quantise(complex: &Complex, vertices: usize, cells: f64) -> Result<Lattice, GridError> {
+    let is_number = (1.0..=MOST_CELLS).contains(&cells);
+    if !is_number {
+        let most = MOST_CELLS;
+        return Err(GridError::Cells { cells, most });
+    }
     let area: f64 = complex.faces().map(|f| 0.5 * complex.double_area(f)).sum();
     let wanted = (cells / area).sqrt();
     let mut walks = Walks::default();

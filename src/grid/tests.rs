@@ -3,6 +3,7 @@
 use super::blocks::{Blocks, Piece};
 use super::complex::Complex;
 use super::cone_triangulation::{ConeTriangulation, complex, reduce};
+use super::error::GridError;
 use super::lattice::Lattice;
 use super::quads::QuadMesh;
 use super::quantise::quantise;
@@ -417,4 +418,15 @@ fn what_is_no_quarter_turn_is_refused() {
     let (c, uv) = (&squares.connectivity, &squares.uv);
     let refused = complex(c, uv, &squares.is_line).unwrap_err().to_string();
     assert!(refused.contains("quarter turn"), "{refused}");
+}
+
+#[test]
+fn numbers_that_are_none_are_refused() {
+    let x = cuboid([1, 1, 1], 2, no_lines).reduced();
+    for cells in [0.0, -3.0, f64::NAN, f64::INFINITY, 1e12] {
+        let refused = quantise(&x.complex, x.vertex.len(), cells).unwrap_err();
+        assert!(matches!(refused, GridError::Cells { .. }), "{refused}");
+    }
+    let refused = Lattice::new(x.complex, 1.0).quads().unwrap_err();
+    assert!(matches!(refused, GridError::NoArea { .. }), "{refused}");
 }

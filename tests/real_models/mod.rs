@@ -3,6 +3,7 @@
 // Not every test binary uses all of it.
 #![allow(dead_code)]
 
+pub mod grids;
 pub mod lines;
 pub mod plates;
 pub mod watertight;
