@@ -193,6 +193,12 @@ impl Complex {
         cross(a, b).atan2(dot(a, b))
     }
 
+    /// The same, where a face that rounding has turned over counts as flat.
+    pub fn blunt_angle(&self, h: HalfedgeId) -> f64 {
+        let (a, b) = (self.side[h].vector, minus(self.side[self.prev(h)].vector));
+        cross(a, b).max(0.0).atan2(dot(a, b))
+    }
+
     /// Turns the frame of a face by quarter turns.
     pub fn turn(&mut self, f: FaceId, turns: u8) {
         for k in 0..3 {

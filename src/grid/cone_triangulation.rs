@@ -22,8 +22,10 @@ const MOST_LOCAL_FLIPS: usize = 200;
 const MOST_FLIPS_OF_EDGE: usize = 64;
 /// By how much two sides may be off a straight line that are made one, radians.
 const STRAIGHT: f64 = 1e-9;
-/// By how much an angle around a vertex may miss a multiple of a quarter turn, quarter turns.
+/// By how much an angle around a vertex may miss a multiple of a quarter turn, quarter turns: what rounding does to the angles of thin faces.
 const NEARLY: f64 = 0.05;
+/// By how much sides may miss each other after a quarter turn, and sides of lines the axes: part of their length, or part of the surface's size.
+const ROUNDING: [f64; 2] = [1e-6, 1e-9];
 
 /// A surface on the plane: `uv` corners of faces, in one unit, such that sides that are glued differ by quarter turns and translations. `is_line`: edges that stay.
 pub fn complex(
@@ -56,13 +58,29 @@ pub fn complex(
         });
     }
     let sides: HalfedgeVec<Side> = sides.into();
+    let length = |[x, y]: [f64; 2]| x.hypot(y);
+    let longest = sides.iter().map(|s| length(s.vector)).fold(0.0, f64::max);
     for (h, side) in sides.enumerate() {
-        let Some(t) = side.twin else { continue };
-        let there = turned(side.vector, side.turns);
-        let gap = (there[0] + sides[t].vector[0]).hypot(there[1] + sides[t].vector[1]);
-        let length = side.vector[0].hypot(side.vector[1]);
-        let is_quarter = gap <= NEARLY * length;
-        if !(is_quarter && (side.turns + sides[t].turns).is_multiple_of(4)) {
+        let [of_length, of_size] = ROUNDING;
+        let allowed = (of_length * length(side.vector)).max(of_size * longest);
+        let off = match side.is_line {
+            true => side.vector[0].abs().min(side.vector[1].abs()),
+            false => 0.0,
+        };
+        let (gap, turns) = match side.twin {
+            Some(t) => {
+                let [x, y] = turned(side.vector, side.turns);
+                let back = sides[t].vector;
+                (
+                    length([x + back[0], y + back[1]]),
+                    side.turns + sides[t].turns,
+                )
+            }
+            None => (0.0, 0),
+        };
+        let gap = gap.max(off);
+        let is_quarter = gap <= allowed && turns.is_multiple_of(4);
+        if !is_quarter {
             return Err(GridError::NoQuarterTurn {
                 edge: c.edge(h),
                 gap,
@@ -75,6 +93,8 @@ pub fn complex(
 /// Which vertices stay: all around which something is not flat or a line not straight. The angle around a vertex, or from line to line, in quarter turns must be whole.
 fn marked(complex: &Complex, vertices: usize) -> Result<VertexVec<bool>, GridError> {
     let mut is_marked = VertexVec::filled(false, vertices);
+    // Four times χ, in quarter turns.
+    let mut curvature = 0;
     for v in complex.vertices() {
         let star = complex.star(v);
         let is_border = complex.side(star[0]).twin.is_none();
@@ -88,11 +108,12 @@ fn marked(complex: &Complex, vertices: usize) -> Result<VertexVec<bool>, GridErr
         let mut sectors: Vec<f64> = Vec::new();
         for &h in order {
             match sectors.last_mut() {
-                Some(angle) if !complex.side(h).is_line => *angle += complex.angle(h),
-                _ => sectors.push(complex.angle(h)),
+                Some(angle) if !complex.side(h).is_line => *angle += complex.blunt_angle(h),
+                _ => sectors.push(complex.blunt_angle(h)),
             }
         }
         let mut is_straight = true;
+        curvature += if is_border { 2 } else { 4 };
         for angle in &sectors {
             let quarters = angle / FRAC_PI_2;
             if !((quarters - quarters.round()).abs() < NEARLY && quarters.round() >= 1.0) {
@@ -103,6 +124,7 @@ fn marked(complex: &Complex, vertices: usize) -> Result<VertexVec<bool>, GridErr
             }
             let flat = if lines.is_some() { 2.0 } else { 4.0 };
             is_straight &= quarters.round() == flat;
+            curvature -= quarters.round() as i64;
         }
         let wanted = match (lines, is_border) {
             (None, _) | (_, true) => 1,
@@ -111,7 +133,16 @@ fn marked(complex: &Complex, vertices: usize) -> Result<VertexVec<bool>, GridErr
         is_marked[v] = !(is_straight && sectors.len() == wanted);
     }
     keep_one(complex, &mut is_marked);
-    Ok(is_marked)
+    let edges = complex.sides().map(|h| match complex.side(h).twin {
+        Some(_) => 1,
+        None => 2,
+    });
+    let counts = [complex.vertices().count(), complex.faces().count()].map(|n| n as i64);
+    let euler = counts[0] - edges.sum::<i64>() / 2 + counts[1];
+    match curvature == 4 * euler {
+        true => Ok(is_marked),
+        false => Err(GridError::GaussBonnet { curvature, euler }),
+    }
 }
 
 /// Marks a vertex of every closed line and of every piece that have none.

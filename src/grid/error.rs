@@ -25,6 +25,16 @@ pub enum GridError {
         /// The angle, quarter turns.
         quarters: f64,
     },
+    /// Angles do not sum to what the surface has.
+    #[error(
+        "the angles of the flat surface leave {curvature} quarter turns of curvature, but its Euler characteristic is {euler} (Gauss–Bonnet): faces are too thin for float64's 16 digits"
+    )]
+    GaussBonnet {
+        /// Σ (4 − angle) inside and Σ (2 − angle) on the border, quarter turns.
+        curvature: i64,
+        /// χ; curvature should be four times that.
+        euler: i64,
+    },
     /// No whole numbers were found.
     #[error(
         "no grid was found whose cells fit between the cones of the surface: ask for more cells, or for fewer cones (cones.count)"

@@ -33,6 +33,10 @@ fn cross([a, b]: [i64; 2], [c, d]: [i64; 2]) -> i64 {
     a * d - b * c
 }
 
+fn wide(a: i64, b: i64) -> i128 {
+    i128::from(a) * i128::from(b)
+}
+
 impl Lattice {
     /// With the steps that the complex has.
     pub fn new(complex: Complex, scale: f64) -> Self {
@@ -201,10 +205,11 @@ impl Lattice {
                 complex.side(complex.prev(h)).steps,
                 complex.side(complex.next(h)).steps,
             );
-            let dot = i128::from(-a[0] * b[0] - a[1] * b[1]);
-            (dot, i128::from(cross(b, a).abs()))
+            let dot = -wide(a[0], b[0]) - wide(a[1], b[1]);
+            (dot, (wide(b[0], a[1]) - wide(b[1], a[0])).abs())
         };
         let ((c, s), (d, t)) = (corner(h), corner(t));
-        c * t + d * s < 0
+        // In the metric too: or the map from there to the lattice would turn a face over.
+        c * t + d * s < 0 && complex.is_convex(h)
     }
 }

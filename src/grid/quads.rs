@@ -196,23 +196,34 @@ impl Extraction<'_> {
 
     fn list_inside(&mut self, f: FaceId) {
         let corners = self.lattice.corners(f);
-        let range = |i: usize| {
-            let values = corners.map(|p| p[i]);
-            let (low, high) = (values.iter().min(), values.iter().max());
-            low.copied().unwrap_or(0)..=high.copied().unwrap_or(0)
-        };
-        for y in range(1) {
-            for x in range(0) {
-                let at = [x, y];
-                if self.place(f, at) == Some(Place::Inside) {
-                    let dart = |direction| Dart {
-                        face: f,
-                        at,
-                        direction,
-                    };
-                    let darts = (0..4).map(dart).collect();
-                    self.push(Name::Face(f, at), f, at, None, darts);
+        let rows = corners.map(|p| p[1]);
+        let [low, high] = [rows.iter().min(), rows.iter().max()].map(|y| y.copied().unwrap_or(0));
+        for y in low..=high {
+            // On the left of side k: steps × (x − corner) > 0, a bound for x by the sign of its second step.
+            let (mut begin, mut end) = (i128::MIN, i128::MAX);
+            let mut is_empty = false;
+            for (k, corner) in corners.iter().enumerate() {
+                let [a, b] = self.steps(side(f, k)).map(i128::from);
+                let [x, y] = [i128::from(corner[0]), i128::from(y - corner[1])];
+                // b x' < a y with x' from the corner.
+                match b.signum() {
+                    1 => end = end.min(x + (a * y + b - 1).div_euclid(b) - 1),
+                    -1 => begin = begin.max(x + (-a * y).div_euclid(-b) + 1),
+                    _ => is_empty |= a * y <= 0,
                 }
+            }
+            if is_empty {
+                continue;
+            }
+            for x in begin..=end {
+                let at = [x as i64, y];
+                let dart = |direction| Dart {
+                    face: f,
+                    at,
+                    direction,
+                };
+                let darts = (0..4).map(dart).collect();
+                self.push(Name::Face(f, at), f, at, None, darts);
             }
         }
     }

@@ -13,8 +13,10 @@ use super::walk::{Entry, State, Walks};
 use crate::geometry::ids::{FaceId, HalfedgeId, VertexVec};
 use std::collections::{BTreeMap, BinaryHeap};
 
-/// Most cells: squares of steps stay far within 64 bits.
-const MOST_CELLS: f64 = 1e8;
+/// Most cells: a quad mesh of them takes some 5 GB.
+const MOST_CELLS: f64 = 1e7;
+/// Most cells along a side, whose squares stay within 64 bits.
+const LONGEST: f64 = 1e9;
 /// Rounds of mending in which nothing is gained, before it is tried at a larger size.
 const MOST_STUCK: usize = 40;
 /// Factor between sizes.
@@ -58,9 +60,6 @@ pub fn quantise(complex: &Complex, vertices: usize, cells: f64) -> Result<Lattic
     let (mut low, mut high) = (None, None);
     for _ in 0..MOST_SIZES {
         let off = miss(&lattice);
-        if off.abs() < miss(&best).abs() {
-            best = lattice.clone();
-        }
         if off.abs() < NEAR {
             break;
         }
@@ -72,7 +71,15 @@ pub fn quantise(complex: &Complex, vertices: usize, cells: f64) -> Result<Lattic
             (Some(low), Some(high)) => f64::sqrt(low * high),
             _ => lattice.scale * (0.5 * off).exp(),
         };
+        let before = lattice.cells();
         lattice.settle(vertices, &angles, &mut walks);
+        if miss(&lattice).abs() < miss(&best).abs() {
+            best = lattice.clone();
+        }
+        // No fewer fit between the cones.
+        if off < 0.0 && lattice.cells() == before {
+            break;
+        }
     }
     Ok(best)
 }
@@ -87,6 +94,10 @@ fn first(
     let mut scale = wanted;
     for _ in 0..MOST_GROWTHS {
         let mut lattice = Lattice::new(complex.clone(), scale);
+        let sides = complex.sides().flat_map(|h| lattice.wanted(h));
+        if sides.fold(0.0, |most, x| f64::max(most, x.abs())) > LONGEST {
+            break;
+        }
         let angles = lattice.angles(vertices, false);
         lattice.round();
         lattice.close()?;

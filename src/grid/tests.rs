@@ -228,6 +228,7 @@ fn assert_grid(lattice: &Lattice, x: &ConeTriangulation) {
             lattice.missing(f) == 0 && lattice.surplus(f) == [0, 0],
             "{f}"
         );
+        assert!(lattice.complex.double_area(f) > 0.0, "{f}");
     }
     for h in lattice.complex.sides() {
         let side = lattice.complex.side(h);
@@ -265,17 +266,10 @@ fn assert_quads(lattice: &Lattice, angles: &VertexVec<Vec<i64>>) {
     let edges = (edges + border) / 2;
     let degrees: usize = mesh.points.iter().map(|p| p.valence).sum();
     assert_eq!(degrees, 2 * edges);
-    for point in &mesh.points {
-        let is_border = point.valence < 4 && point.vertex.is_none();
-        let wanted = match point.vertex {
-            Some(v) => {
-                let star = lattice.complex.star(v);
-                let is_border = lattice.complex.side(star[0]).twin.is_none();
-                angles[v].iter().sum::<i64>() as usize + usize::from(is_border)
-            }
-            None if is_border => 3,
-            None => 4,
-        };
+    for (point, is_border) in mesh.points.iter().zip(border_points(&mesh)) {
+        let flat = if is_border { 2 } else { 4 };
+        let quarters = point.vertex.map_or(flat, |v| angles[v].iter().sum());
+        let wanted = quarters as usize + usize::from(is_border);
         assert_eq!(point.valence, wanted, "{point:?}");
     }
     let complex = &lattice.complex;
@@ -288,6 +282,17 @@ fn assert_quads(lattice: &Lattice, angles: &VertexVec<Vec<i64>>) {
     let found = mesh.points.len() as i64 - edges as i64 + mesh.quads.len() as i64;
     assert_eq!(found, euler);
     assert_blocks(&mesh, euler);
+}
+
+fn border_points(mesh: &QuadMesh) -> Vec<bool> {
+    let mut is_border = vec![false; mesh.points.len()];
+    for (corners, across) in mesh.quads.iter().zip(&mesh.across) {
+        for k in (0..4).filter(|&k| across[k].is_none()) {
+            is_border[corners[k] as usize] = true;
+            is_border[corners[(k + 1) % 4] as usize] = true;
+        }
+    }
+    is_border
 }
 
 /// Every square in one block, sides that agree from both sides, and no more blocks than lines can make.
@@ -312,6 +317,8 @@ fn assert_blocks(mesh: &QuadMesh, euler: i64) {
                     length: piece.length,
                     across: Some((b, s, piece.start)),
                 };
+                let is_whole = c != b && pieces.len() == 1 && sides[c][t].len() == 1;
+                assert!(!is_whole, "blocks {b} and {c} could be one");
                 assert!(
                     sides[c][t].contains(&mirrored),
                     "{piece:?} {:?}",
@@ -320,13 +327,7 @@ fn assert_blocks(mesh: &QuadMesh, euler: i64) {
             }
         }
     }
-    let mut is_border = vec![false; mesh.points.len()];
-    for (corners, across) in mesh.quads.iter().zip(&mesh.across) {
-        for k in (0..4).filter(|&k| across[k].is_none()) {
-            is_border[corners[k] as usize] = true;
-            is_border[corners[(k + 1) % 4] as usize] = true;
-        }
-    }
+    let is_border = border_points(mesh);
     let lines = mesh
         .points
         .iter()
@@ -418,6 +419,20 @@ fn what_is_no_quarter_turn_is_refused() {
     let (c, uv) = (&squares.connectivity, &squares.uv);
     let refused = complex(c, uv, &squares.is_line).unwrap_err().to_string();
     assert!(refused.contains("quarter turn"), "{refused}");
+    // A little off, and a border of a hundred sides, most of them along no axis.
+    let mut squares = cuboid([1, 1, 1], 2, no_lines);
+    let (sine, cosine) = 0.01f64.sin_cos();
+    squares.uv[f] = squares.uv[f].map(|[x, y]| [cosine * x - sine * y, sine * x + cosine * y]);
+    assert!(complex(&squares.connectivity, &squares.uv, &squares.is_line).is_err());
+    let rim = |i: u32| {
+        let (y, x) = (std::f64::consts::TAU * f64::from(i) / 100.0).sin_cos();
+        [x, y]
+    };
+    let faces: Vec<[u32; 3]> = (0..100).map(|i| [100, i, (i + 1) % 100]).collect();
+    let uv = faces.iter().map(|f| [[0.0; 2], rim(f[1]), rim(f[2])]);
+    let c = Connectivity::from_faces(&faces, 101).unwrap();
+    let is_line = EdgeVec::filled(false, c.edge_count());
+    assert!(complex(&c, &uv.collect(), &is_line).is_err());
 }
 
 #[test]

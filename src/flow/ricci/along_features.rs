@@ -37,7 +37,7 @@ pub(super) fn flow(
     let c = surface.connectivity;
     let all = edges_of(from.features.iter());
     let mut is_held = vec![true; from.features.len()];
-    // Twice as many every time: at most about twice as many as need be, after few attempts.
+    // Twice as many every time, so that few attempts are needed.
     let mut given_up = 1;
     loop {
         let held = || {

@@ -1,7 +1,7 @@
 //! From lengths found by Newton's method on all edges to a [`FlatMetric`], whatever was prescribed.
 //!
 //! *Enters:* a triangulation with loops and a signature. *Leaves:* a [`FlatMetric`] like that of the conformal flow, with the scale that
-//! comes nearest to it. *Guaranteed:* borders and features are edges of C, so nothing crosses them, but for borders beside faces without width.
+//! comes nearest to it. *Guaranteed:* borders and features are edges of C, so nothing crosses them, but for borders beside faces without width, and where the conformal metric is taken as it is.
 
 use super::error::FlowError;
 use super::flat_metric::{FlatMetric, QuarterTurns};
