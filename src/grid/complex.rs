@@ -187,16 +187,24 @@ impl Complex {
         star
     }
 
-    /// The angle of the corner that a side leaves, radians.
+    /// The angle of the corner that a side leaves, radians; a face that rounding has turned over counts as flat.
     pub fn angle(&self, h: HalfedgeId) -> f64 {
         let (a, b) = (self.side[h].vector, minus(self.side[self.prev(h)].vector));
-        cross(a, b).atan2(dot(a, b))
+        cross(a, b).max(0.0).atan2(dot(a, b))
     }
 
-    /// The same, where a face that rounding has turned over counts as flat.
-    pub fn blunt_angle(&self, h: HalfedgeId) -> f64 {
-        let (a, b) = (self.side[h].vector, minus(self.side[self.prev(h)].vector));
-        cross(a, b).max(0.0).atan2(dot(a, b))
+    /// Sums of the angles of a star from line to line, from the first line on; one sum where it has none.
+    pub fn sectors(&self, star: &[HalfedgeId], angle: impl Fn(HalfedgeId) -> f64) -> Vec<f64> {
+        let first = star.iter().position(|&h| self.side[h].is_line);
+        let order = star.iter().cycle().skip(first.unwrap_or(0));
+        let mut sectors: Vec<f64> = Vec::new();
+        for &h in order.take(star.len()) {
+            match sectors.last_mut() {
+                Some(sum) if !self.side[h].is_line => *sum += angle(h),
+                _ => sectors.push(angle(h)),
+            }
+        }
+        sectors
     }
 
     /// Turns the frame of a face by quarter turns.

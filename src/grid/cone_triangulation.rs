@@ -98,20 +98,8 @@ fn marked(complex: &Complex, vertices: usize) -> Result<VertexVec<bool>, GridErr
     for v in complex.vertices() {
         let star = complex.star(v);
         let is_border = complex.side(star[0]).twin.is_none();
-        // Angles between lines, from the first on.
-        let lines = star.iter().position(|&h| complex.side(h).is_line);
-        let order = star
-            .iter()
-            .cycle()
-            .skip(lines.unwrap_or(0))
-            .take(star.len());
-        let mut sectors: Vec<f64> = Vec::new();
-        for &h in order {
-            match sectors.last_mut() {
-                Some(angle) if !complex.side(h).is_line => *angle += complex.blunt_angle(h),
-                _ => sectors.push(complex.blunt_angle(h)),
-            }
-        }
+        let has_line = star.iter().any(|&h| complex.side(h).is_line);
+        let sectors = complex.sectors(&star, |h| complex.angle(h));
         let mut is_straight = true;
         curvature += if is_border { 2 } else { 4 };
         for angle in &sectors {
@@ -122,14 +110,11 @@ fn marked(complex: &Complex, vertices: usize) -> Result<VertexVec<bool>, GridErr
                     quarters,
                 });
             }
-            let flat = if lines.is_some() { 2.0 } else { 4.0 };
+            let flat = if has_line { 2.0 } else { 4.0 };
             is_straight &= quarters.round() == flat;
             curvature -= quarters.round() as i64;
         }
-        let wanted = match (lines, is_border) {
-            (None, _) | (_, true) => 1,
-            (Some(_), false) => 2,
-        };
+        let wanted = if has_line && !is_border { 2 } else { 1 };
         is_marked[v] = !(is_straight && sectors.len() == wanted);
     }
     keep_one(complex, &mut is_marked);

@@ -136,23 +136,10 @@ impl Lattice {
     fn angles_at(&self, v: VertexId, on_lattice: bool) -> Vec<i64> {
         let complex = &self.complex;
         let star = complex.star(v);
-        let first = star.iter().position(|&h| complex.side(h).is_line);
-        let order = star
-            .iter()
-            .cycle()
-            .skip(first.unwrap_or(0))
-            .take(star.len());
-        let mut sectors: Vec<f64> = Vec::new();
-        for &h in order {
-            let angle = match on_lattice {
-                true => self.angle(h),
-                false => complex.angle(h),
-            };
-            match sectors.last_mut() {
-                Some(sum) if !complex.side(h).is_line => *sum += angle,
-                _ => sectors.push(angle),
-            }
-        }
+        let sectors = complex.sectors(&star, |h| match on_lattice {
+            true => self.angle(h),
+            false => complex.angle(h),
+        });
         let quarters = sectors.iter().map(|a| (a / FRAC_PI_2).round() as i64);
         let quarters: Vec<i64> = quarters.collect();
         // Inside, a flip may let a star begin at another line.
