@@ -7,6 +7,7 @@ pub mod frame;
 pub mod ids;
 pub mod mesh;
 pub(crate) mod polygon;
+pub(crate) mod subdivision;
 pub mod triangle;
 
 #[cfg(test)]

@@ -357,7 +357,7 @@ impl Walls<'_> {
 }
 
 /// Squares along a side of a block, counterclockwise, with their sides there.
-fn side_of(block: &Block, s: usize) -> Vec<(u32, u8)> {
+pub(super) fn side_of(block: &Block, s: usize) -> Vec<(u32, u8)> {
     let [w, h] = block.cells;
     let at = |i: usize, j: usize| {
         let (q, k) = block.squares[j * w + i];

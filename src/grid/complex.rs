@@ -43,6 +43,9 @@ pub struct Side {
     pub tail: VertexId,
     /// From there to its end, in the frame of its face.
     pub vector: [f64; 2],
+    /// The angle at its tail from where the surface's [`vertex_halfedge`](crate::geometry::connectivity::Connectivity::vertex_halfedge) goes, counterclockwise,
+    /// radians: which way it goes where an angle may be more than a full turn. Up to full angles around the vertex.
+    pub bearing: f64,
     /// The same on the lattice, cells; zero before the surface is quantised.
     pub steps: [i64; 2],
     /// The side that it is glued to; `None` on the border.
@@ -278,17 +281,28 @@ impl Complex {
         let vector = add(self.side[tp].vector, self.side[hn].vector);
         let [p, q] = [tp, hn].map(|h| self.side[h].steps);
         let steps = [p[0] + q[0], p[1] + q[1]];
+        let bearing = |from: HalfedgeId, vector: [f64; 2]| {
+            let Side {
+                bearing,
+                vector: beside,
+                ..
+            } = self.side[from];
+            bearing + cross(beside, vector).atan2(dot(beside, vector))
+        };
+        // Seen from d and from c.
+        let bearings = [bearing(tp, vector), bearing(hp, minus(vector))];
         self.moved(&[(hp, hn), (tn, hp), (tp, tn), (hn, tp)]);
-        let side = |tail, vector, steps, twin| Side {
+        let side = |tail, vector, bearing, steps, twin| Side {
             tail,
             vector,
+            bearing,
             steps,
             twin: Some(twin),
             turns: 0,
             is_line: false,
         };
-        self.side[h] = side(d, vector, steps, t);
-        self.side[t] = side(c, minus(vector), turned(steps, 2), h);
+        self.side[h] = side(d, vector, bearings[0], steps, t);
+        self.side[t] = side(c, minus(vector), bearings[1], turned(steps, 2), h);
         for h in [h, hn, hp, t, tn, tp] {
             self.first[self.side[h].tail] = Some(h);
         }
@@ -370,6 +384,7 @@ impl Complex {
         Side {
             tail: self.side[one].tail,
             vector: add(self.side[one].vector, self.side[other].vector),
+            bearing: self.side[one].bearing,
             steps: [0; 2],
             twin,
             turns: 0,

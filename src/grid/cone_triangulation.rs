@@ -51,13 +51,14 @@ pub fn complex(
         sides.push(Side {
             tail: c.tail(h),
             vector: own,
+            bearing: 0.0,
             steps: [0; 2],
             twin,
             turns: turns.rem_euclid(4) as u8,
             is_line: is_line[c.edge(h)] || twin.is_none(),
         });
     }
-    let sides: HalfedgeVec<Side> = sides.into();
+    let mut sides: HalfedgeVec<Side> = sides.into();
     let length = |[x, y]: [f64; 2]| x.hypot(y);
     let longest = sides.iter().map(|s| length(s.vector)).fold(0.0, f64::max);
     for (h, side) in sides.enumerate() {
@@ -85,6 +86,14 @@ pub fn complex(
                 edge: c.edge(h),
                 gap,
             });
+        }
+    }
+    for v in c.vertices() {
+        let mut bearing = 0.0;
+        for h in c.outgoing(v) {
+            sides[h].bearing = bearing;
+            let (a, [x, y]) = (sides[h].vector, sides[c.prev(h)].vector);
+            bearing += (x * a[1] - y * a[0]).atan2(-a[0] * x - a[1] * y);
         }
     }
     Ok(Complex::new(sides, c.vertex_count()))

@@ -1,5 +1,6 @@
 //! Why a surface has no grid.
 
+use crate::flow::solve::SolveError;
 use crate::geometry::ids::{EdgeId, FaceId, VertexId};
 
 /// Why there is no grid.
@@ -78,4 +79,31 @@ pub enum GridError {
         /// A square there.
         square: u32,
     },
+    /// A straight line from cone to cone did not arrive.
+    #[error(
+        "line {line} of the grid was lost in face {face}: faces there are too thin for float64's 16 digits"
+    )]
+    Lost {
+        /// Number of the line.
+        line: u32,
+        /// Where it was last, a face of the refined surface.
+        face: FaceId,
+    },
+    /// Faces and lines between cones do not fit together.
+    #[error("face {face} of the refined surface lies in no triangle between cones")]
+    NoTriangle {
+        /// Face of the refined surface.
+        face: FaceId,
+    },
+    /// A face is turned over by the map.
+    #[error("{count} faces of the surface are turned over on the grid, face {face} of its refinement first")]
+    TurnedOver {
+        /// How many.
+        count: usize,
+        /// The first.
+        face: FaceId,
+    },
+    /// A system of equations could not be solved.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
 }

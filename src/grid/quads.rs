@@ -37,6 +37,21 @@ pub struct QuadMesh {
     pub quads: Vec<[u32; 4]>,
     /// Across side k of a square, from its corner k to the next: square and side there; `None` on the border.
     pub across: Vec<[Option<(u32, u8)>; 4]>,
+    /// Of every point, its first edge, and the square and side that it is.
+    first: Vec<(Dart, (u32, u8))>,
+}
+
+impl QuadMesh {
+    /// Of every vertex of the complex: the side that leaves it before the first edge counterclockwise, the direction of that edge in the frame of the side's face, and the square and side that it is.
+    pub fn first_edges(&self, lattice: &Lattice) -> Vec<(HalfedgeId, u8, (u32, u8))> {
+        let vertices = self.points.iter().zip(&self.first);
+        let vertices = vertices.filter(|(p, _)| p.vertex.is_some());
+        let first = vertices.map(|(_, (dart, edge))| {
+            let corner = lattice.corners(dart.face).iter().position(|at| *at == dart.at);
+            (side(dart.face, corner.unwrap_or(0)), dart.direction, *edge)
+        });
+        first.collect()
+    }
 }
 
 /// Where a point is in a face.
@@ -84,8 +99,12 @@ fn side(f: FaceId, k: usize) -> HalfedgeId {
     HalfedgeId::new(3 * f.index() + k)
 }
 
-/// Corners, and what is across sides.
-type Squares = (Vec<[u32; 4]>, Vec<[Option<(u32, u8)>; 4]>);
+/// Corners, what is across sides, and the first edge of every point.
+type Squares = (
+    Vec<[u32; 4]>,
+    Vec<[Option<(u32, u8)>; 4]>,
+    Vec<(Dart, (u32, u8))>,
+);
 
 /// Names of points that do not depend on the face they are seen from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -124,7 +143,7 @@ impl Lattice {
             darts: Vec::new(),
         };
         extraction.list();
-        let (quads, across) = extraction.squares()?;
+        let (quads, across, first) = extraction.squares()?;
         if quads.len() as i64 != self.cells() {
             return Err(GridError::Quads {
                 found: quads.len(),
@@ -135,6 +154,7 @@ impl Lattice {
             points: extraction.points,
             quads,
             across,
+            first,
         })
     }
 }
@@ -453,7 +473,12 @@ impl Extraction<'_> {
             .map(|q: &[usize; 4]| q.map(|dart| side[back[dart]]));
         let across = across.collect();
         let quads = quads.iter().map(|q| q.map(|dart| point_of[dart] as u32));
-        Ok((quads.collect(), across))
+        let mut firsts = Vec::with_capacity(self.points.len());
+        for (point, darts) in self.darts.iter().enumerate() {
+            let edge = side[first[point]].ok_or_else(|| broken(point))?;
+            firsts.push((darts[0], edge));
+        }
+        Ok((quads.collect(), across, firsts))
     }
 
     /// Whether the first dart of a point has nothing on its right.

@@ -28,7 +28,7 @@ use publication::Publication;
 use crate::atlas::develop::Development;
 use crate::atlas::geometry_image::SourceSurface;
 use crate::atlas::patches::Domain;
-use crate::atlas::rectangles::Charted;
+use crate::atlas::charted::Charted;
 use crate::atlas::{axes, charts, develop, geometry_image, patches, rectangles};
 use crate::config::Config;
 use crate::export::folder::list_files;

@@ -10,9 +10,10 @@ use super::flow::Rectangle;
 use super::glue::Added;
 use super::quads::Quad;
 use super::sides::Drawing;
-use super::subdivision::Subdivision;
+use crate::atlas::charted::{self, Charted};
+use crate::geometry::subdivision::Subdivision;
 use super::{
-    Charted, RectangleError, clusters, contract, density, division, flow, glue, lift, parity,
+    RectangleError, clusters, contract, density, division, flow, glue, parity,
     place, quadrangulate, quads, relax, sizes, walls,
 };
 use crate::atlas::geometry_image::{GeometryImage, sample};
@@ -135,7 +136,7 @@ fn finished(
     let least =
         |value: fn(&Rectangle) -> f64| flattened.iter().map(value).fold(f64::INFINITY, f64::min);
     let (fine, face_patch) = glue::glue(&drawing.fine, &flattened, &added)?;
-    let surface = lift::lift(surface.clone(), &fine);
+    let surface = charted::lift(surface.clone(), &fine);
     let c = &fine.connectivity;
     let uv: FaceVec<[[f64; 2]; 3]> = c
         .faces()

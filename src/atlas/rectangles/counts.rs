@@ -8,7 +8,7 @@
 //! along and across every rectangle, and with that the numbers are those for which the sum of squared errors is least ([`Strips::bent`]).
 
 use super::quads::Quad;
-use super::subdivision::Subdivision;
+use crate::geometry::subdivision::Subdivision;
 use crate::atlas::texels::{Bend, Shares};
 use rustc_hash::FxHashMap as Map;
 

@@ -7,7 +7,7 @@
 //! and their grid lines allow.
 
 use super::flow::Rectangle;
-use super::subdivision::Subdivision;
+use crate::geometry::subdivision::Subdivision;
 use crate::geometry::ids::{FaceVec, VertexVec};
 use crate::geometry::triangle::area;
 

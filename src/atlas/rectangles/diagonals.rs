@@ -6,7 +6,7 @@
 //! Where the mirror of a doubled surface passes through a face, what is left of it is a cell of four or five corners. In the flat metric it is convex, and how it is triangulated does not
 //! matter; a map to a rectangle need not keep it convex, and faces across a corner that points inwards would be turned over.
 
-use super::subdivision::Subdivision;
+use crate::geometry::subdivision::Subdivision;
 use crate::atlas::overlay::{Carrier, Layout};
 use crate::atlas::patches::apex;
 use crate::atlas::plane::{distance, doubled_area};

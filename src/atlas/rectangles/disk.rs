@@ -5,7 +5,7 @@
 
 use super::RectangleError;
 use super::harmonic::harmonic;
-use super::subdivision::Subdivision;
+use crate::geometry::subdivision::Subdivision;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{
     EdgeId, EdgeVec, FaceId, FaceVec, HalfedgeId, HalfedgeVec, NONE, VertexId, VertexVec,

@@ -9,7 +9,7 @@
 use super::RectangleError;
 use super::diagonals;
 use super::quads::Quad;
-use super::subdivision::{Corner, Subdivision};
+use crate::geometry::subdivision::{Corner, Subdivision};
 use crate::atlas::overlay::{self, Carrier, Layout, OnBase, Overlay};
 use crate::flow::prescription::{BoundaryCondition, Prescription};
 use crate::flow::ricci::{self, FlowParams};

@@ -8,7 +8,7 @@
 
 use super::RectangleError;
 use super::flow::{Piece, Rectangle};
-use super::subdivision::{Corner, Subdivision};
+use crate::geometry::subdivision::{Corner, Subdivision};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{
     EdgeId, EdgeVec, FaceId, HalfedgeId, HalfedgeVec, NONE, PatchId, VertexId, VertexVec,

@@ -41,7 +41,6 @@ mod division;
 mod flow;
 mod glue;
 mod harmonic;
-mod lift;
 mod parity;
 mod place;
 mod quadrangulate;
@@ -49,19 +48,15 @@ mod quads;
 mod relax;
 mod sides;
 mod sizes;
-mod subdivision;
 mod walls;
 
 #[cfg(test)]
 mod tests;
 
-use crate::atlas::charts::Charts;
-use crate::atlas::cut::CutGraph;
-use crate::atlas::develop::Development;
+use crate::atlas::charted::Charted;
 use crate::atlas::overlay::OverlayError;
 use crate::atlas::patches::{PatchLayout, PatchParams};
-use crate::flow::prescription::Prescription;
-use crate::flow::ricci::{FlatMetric, FlowError};
+use crate::flow::ricci::FlowError;
 use crate::flow::solve::SolveError;
 use crate::geometry::connectivity::ConnectivityError;
 use crate::geometry::mesh::Mesh;
@@ -79,23 +74,6 @@ const LEAST_FACES: usize = 12;
 const MOST_PIECES: usize = 16;
 /// So many more are allowed, whatever the number of faces.
 const ALLOWED_PIECES: usize = 60_000;
-
-/// A surface with its flat metric, slit, developed and covered by charts.
-#[derive(Clone, Debug)]
-pub struct Charted {
-    /// The surface.
-    pub mesh: Mesh,
-    /// Flat metric on its edges.
-    pub metric: FlatMetric,
-    /// Target curvature of its vertices.
-    pub prescription: Prescription,
-    /// The cut on it.
-    pub cut: CutGraph,
-    /// The central chart.
-    pub central: Development,
-    /// All others.
-    pub charts: Charts,
-}
 
 /// Why there are no rectangles.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

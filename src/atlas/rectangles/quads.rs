@@ -17,7 +17,7 @@ use super::chord::{Crossing, aim, zero_level};
 use super::disk::Disk;
 use super::division::{cross, draw, joining, part, places, regions};
 use super::sides::{Drawing, Role};
-use super::subdivision::Subdivision;
+use crate::geometry::subdivision::Subdivision;
 use crate::geometry::ids::{EdgeId, FaceId, VertexId, VertexVec};
 
 /// A four-sided part of a patch.

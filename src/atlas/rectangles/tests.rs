@@ -9,7 +9,7 @@ use super::flow::Rectangle;
 use super::glue::Added;
 use super::quads::{Quad, quads, regions_as_quads};
 use super::sides::Drawing;
-use super::subdivision::Subdivision;
+use crate::geometry::subdivision::Subdivision;
 use super::walls::{self, Fractions};
 use super::{RectangleError, division, flow, place};
 use crate::atlas::cut::cut;

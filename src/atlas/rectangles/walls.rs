@@ -9,7 +9,7 @@
 
 use super::RectangleError;
 use super::flow::{Piece, Rectangle, sides};
-use super::subdivision::Subdivision;
+use crate::geometry::subdivision::Subdivision;
 use crate::geometry::ids::{HalfedgeVec, NONE, VertexId};
 use crate::geometry::mesh::distance;
 use std::ops::Range;

@@ -12,7 +12,7 @@ use crate::geometry::mesh::Mesh;
 
 /// What is known of a corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Corner {
+pub(crate) struct Corner {
     /// Barycentric coordinates in the face of the surface.
     pub weights: [f64; 3],
     /// Coordinates in the corner's patch, where it has some.
@@ -35,7 +35,7 @@ fn mix(p: f64, q: f64, [a, b]: [f64; 2]) -> f64 {
 
 /// See the module docs.
 #[derive(Clone, Debug)]
-pub(super) struct Subdivision {
+pub(crate) struct Subdivision {
     pub connectivity: Connectivity,
     /// Of every vertex, source units. The first ones are the surface's.
     pub position: VertexVec<[f64; 3]>,
@@ -89,6 +89,30 @@ impl Subdivision {
         split.vertex
     }
 
+    /// Splits a face at a point inside it, given by its weights in that face.
+    pub fn split_face(&mut self, f: FaceId, weights: [f64; 3]) -> VertexId {
+        let old = self.connectivity.face_halfedges(f).map(|h| self.corner[h]);
+        let at = self.connectivity.face_vertices(f).map(|v| self.position[v]);
+        let sum = |x: [f64; 3]| (0..3).map(|k| weights[k] * x[k]).sum::<f64>();
+        let inside = Corner {
+            weights: std::array::from_fn(|i| sum(old.map(|c| c.weights[i]))),
+            uv: std::array::from_fn(|i| sum(old.map(|c| c.uv[i]))),
+        };
+        self.position
+            .push(std::array::from_fn(|i| sum(at.map(|p| p[i]))));
+        let split = self.connectivity.split_face(f);
+        for _ in 1..3 {
+            self.parent.push(self.parent[f]);
+            old.iter().for_each(|&c| {
+                self.corner.push(c);
+            });
+        }
+        for (i, face) in split.faces.into_iter().enumerate() {
+            self.corner[HalfedgeId::new(3 * face.index() + (i + 2) % 3)] = inside;
+        }
+        split.vertex
+    }
+
     /// Length of an edge in space.
     pub fn edge_length(&self, e: EdgeId) -> f64 {
         let [a, b] = self.connectivity.edge_vertices(e);
@@ -106,18 +130,51 @@ impl Subdivision {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::atlas::patches::samples;
+    use crate::geometry::ids::NONE;
+
+    /// A flat unit square.
+    fn square(n: u32) -> Mesh {
+        let at = |i: u32, j: u32| i * (n + 1) + j;
+        let mut faces = Vec::new();
+        for (i, j) in (0..n * n).map(|k| (k / n, k % n)) {
+            let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+            faces.extend([[a, b, c], [a, c, d]]);
+        }
+        let count = (n + 1) * (n + 1);
+        let place = |v: u32| {
+            [v / (n + 1), v % (n + 1), 0].map(|x| f64::from(x) / f64::from(n))
+        };
+        Mesh {
+            connectivity: Connectivity::from_faces(&faces, count as usize).unwrap(),
+            positions: (0..count).map(place).collect(),
+            source_vertex: (0..count).collect(),
+            source_face: (0..faces.len() as u32).collect(),
+            face_material: FaceVec::filled(NONE, faces.len()),
+            attributes: Vec::new(),
+        }
+    }
 
     /// Corners lie where their weights say, whatever is split.
     #[test]
     fn weights_reproduce_positions() {
-        let mesh = samples::square(4).mesh;
+        let mesh = square(4);
         let mut fine = Subdivision::identity(&mesh);
         let mut state = 5u64;
-        for _ in 0..300 {
+        for i in 0..300 {
             state = state.wrapping_mul(6364136223846793005).wrapping_add(1);
-            let e = EdgeId::new((state >> 33) as usize % fine.connectivity.edge_count());
-            fine.split_edge(e, 0.1 + 0.8 * ((state >> 20) % 100) as f64 / 100.0);
+            let part = 0.1 + 0.8 * ((state >> 20) % 100) as f64 / 100.0;
+            let any = (state >> 33) as usize;
+            match i % 3 {
+                0 => {
+                    let f = FaceId::new(any % fine.connectivity.face_count());
+                    let other = 0.7 * (1.0 - part);
+                    fine.split_face(f, [part, other, 1.0 - part - other])
+                }
+                _ => {
+                    let e = EdgeId::new(any % fine.connectivity.edge_count());
+                    fine.split_edge(e, part)
+                }
+            };
         }
         let c = &fine.connectivity;
         c.validate().unwrap();

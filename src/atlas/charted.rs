@@ -4,8 +4,6 @@
 //! surface, the same flat metric, the same charts and transitions: only faces are divided. Flat lengths come from differences of weights
 //! in the face that they lie in, so small faces keep their relative accuracy (`docs/method.md`, 6), and pieces of an edge add up to it.
 
-use super::Charted;
-use super::subdivision::Subdivision;
 use crate::atlas::charts::{Chart, ChartFace, Charts, Transition};
 use crate::atlas::cut::{CutGraph, Segment, slit_copies};
 use crate::atlas::develop::Development;
@@ -15,10 +13,28 @@ use crate::geometry::ids::{
     EdgeId, EdgeVec, FaceId, FaceVec, HalfedgeId, NONE, VertexId, VertexVec,
 };
 use crate::geometry::mesh::Mesh;
+use crate::geometry::subdivision::Subdivision;
 use crate::geometry::triangle::area;
 
+/// A surface with its flat metric, slit, developed and covered by charts.
+#[derive(Clone, Debug)]
+pub struct Charted {
+    /// The surface.
+    pub mesh: Mesh,
+    /// Flat metric on its edges.
+    pub metric: FlatMetric,
+    /// Target curvature of its vertices.
+    pub prescription: Prescription,
+    /// The cut on it.
+    pub cut: CutGraph,
+    /// The central chart.
+    pub central: Development,
+    /// All others.
+    pub charts: Charts,
+}
+
 /// Carries over; the subdivision's connectivity and positions become the surface's own.
-pub(super) fn lift(coarse: Charted, fine: &Subdivision) -> Charted {
+pub(crate) fn lift(coarse: Charted, fine: &Subdivision) -> Charted {
     let Charted {
         mesh,
         metric,

@@ -1,0 +1,480 @@
+//! The map of least distortion that is one to one: Newton's method on the symmetric Dirichlet energy.
+//!
+//! *Enters:* a [`GridMap`] without a face turned over. *Leaves:* the same with moved vertices: Σ area (‖J‖² + ‖J⁻¹‖²) over the faces is (nearly) least, where J takes the surface, lengths in cells, to the grid.
+//! *Guaranteed:* every face keeps a positive area at every step, since the energy is infinite where one loses it; cones stay, lines stay on their lattice lines; the same for any number of threads. *Not guaranteed:* the
+//! least of all maps: it is a local minimum.
+//!
+//! The Hessian of a face is made positive semidefinite by its eigenvalues, known in closed form (Smith, de Goes, Kim 2019); steps end before the first face loses its area (Smith, Schaefer 2015).
+
+use super::complex::turned;
+use super::error::GridError;
+use super::map::{Freedom, GridMap, double_area};
+use crate::flow::solve::SymmetricSolver;
+use crate::geometry::ids::{FaceId, HalfedgeVec, VertexVec};
+use rayon::prelude::*;
+
+/// Most steps.
+const MOST_STEPS: usize = 40;
+/// It ends where a step lowers the energy by less than this part.
+const LEAST_GAIN: f64 = 1e-4;
+/// Part of the way to where a face loses its area.
+const BEFORE_FLAT: f64 = 0.9;
+/// Part of the decrease that the gradient promises (Armijo).
+const SUFFICIENT: f64 = 1e-4;
+const MOST_HALVINGS: usize = 30;
+/// Faces whose height in space is less than this part of their longest side are slivers, where edges of two triangulations nearly meet. They say nothing about the shape of the surface:
+/// the energy is to keep them as they are at first.
+const SLIVER: f64 = 1e-4;
+/// What is added to the diagonal, part of it, where rounding keeps the factor from being positive.
+const DAMPINGS: [f64; 4] = [0.0, 1e-12, 1e-9, 1e-6];
+/// Faces a piece of work has at least.
+const PIECE: usize = 1024;
+
+/// A face in space, laid into a plane.
+#[derive(Clone, Copy)]
+struct Rest {
+    /// Area, cells.
+    area: f64,
+    /// Takes edges (p₁ − p₀, p₂ − p₀) on the grid to J: J = D · inverse.
+    inverse: [[f64; 2]; 2],
+}
+
+/// What came of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Relaxed {
+    /// Steps.
+    pub steps: usize,
+    /// Mean of ‖J‖² + ‖J⁻¹‖² before and after, 4 for an isometry.
+    pub energy: [f64; 2],
+}
+
+impl Rest {
+    /// `p` in space, `unit` long where it is 1 here; a sliver is as on the grid.
+    fn new(p: [[f64; 3]; 3], unit: f64, on_grid: [[f64; 2]; 3]) -> Self {
+        let rest = Self::of(p.map(|x| x.map(|x| x / unit)));
+        rest.unwrap_or_else(|| {
+            let flat = Self::of(on_grid.map(|[x, y]| [x, y, 0.0]));
+            flat.unwrap_or_else(|| Self::plane(on_grid))
+        })
+    }
+
+    /// Of a triangle that is no sliver.
+    fn of(p: [[f64; 3]; 3]) -> Option<Self> {
+        let sub = |a: [f64; 3], b: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| a[i] - b[i]) };
+        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let (e, f, g) = (sub(p[1], p[0]), sub(p[2], p[0]), sub(p[2], p[1]));
+        let longest = dot(e, e).max(dot(f, f)).max(dot(g, g));
+        let cross: [f64; 3] = std::array::from_fn(|i| {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            e[j] * f[k] - e[k] * f[j]
+        });
+        let doubled = dot(cross, cross).sqrt();
+        // The first side on the first axis.
+        let l = dot(e, e).sqrt();
+        let (x, height) = (dot(e, f) / l, doubled / l);
+        (doubled >= SLIVER * longest && longest > 0.0)
+            .then(|| Self::plane([[0.0; 2], [l, 0.0], [x, height]]))
+    }
+
+    /// Of a triangle in the plane.
+    fn plane([p, q, r]: [[f64; 2]; 3]) -> Self {
+        let ([a, b], [c, d]) = ([q[0] - p[0], q[1] - p[1]], [r[0] - p[0], r[1] - p[1]]);
+        let determinant = a * d - b * c;
+        Self {
+            area: 0.5 * determinant,
+            inverse: [
+                [d / determinant, -c / determinant],
+                [-b / determinant, a / determinant],
+            ],
+        }
+    }
+
+    /// J for corners on the grid: rows.
+    fn jacobian(&self, [p, q, r]: [[f64; 2]; 3]) -> [[f64; 2]; 2] {
+        let d = [[q[0] - p[0], r[0] - p[0]], [q[1] - p[1], r[1] - p[1]]];
+        let b = self.inverse;
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| d[i][0] * b[0][j] + d[i][1] * b[1][j])
+        })
+    }
+
+    fn energy(&self, corners: [[f64; 2]; 3]) -> f64 {
+        let j = self.jacobian(corners);
+        let determinant = j[0][0] * j[1][1] - j[0][1] * j[1][0];
+        let squared: f64 = j.iter().flatten().map(|x| x * x).sum();
+        match determinant > 0.0 && double_area(corners) > 0.0 {
+            true => self.area * squared * (1.0 + 1.0 / (determinant * determinant)),
+            false => f64::INFINITY,
+        }
+    }
+
+    /// Gradient and positive semidefinite Hessian by the six coordinates of the corners.
+    fn derivatives(&self, corners: [[f64; 2]; 3]) -> ([f64; 6], [[f64; 6]; 6]) {
+        let j = self.jacobian(corners);
+        // J = U Σ Vᵀ with rotations U and V: singular values by half sums and differences.
+        let (e, f) = (0.5 * (j[0][0] + j[1][1]), 0.5 * (j[0][0] - j[1][1]));
+        let (g, h) = (0.5 * (j[1][0] + j[0][1]), 0.5 * (j[1][0] - j[0][1]));
+        let (q, r) = (e.hypot(h), f.hypot(g));
+        let determinant = j[0][0] * j[1][1] - j[0][1] * j[1][0];
+        let s1 = q + r;
+        let s2 = determinant / s1;
+        let (sum, difference) = (h.atan2(e), g.atan2(f));
+        let (of_u, of_v) = (0.5 * (sum + difference), 0.5 * (difference - sum));
+        let (cu, su, cv, sv) = (of_u.cos(), of_u.sin(), of_v.cos(), of_v.sin());
+        let (u, v) = ([[cu, -su], [su, cu]], [[cv, -sv], [sv, cv]]);
+        // U M Vᵀ.
+        let rotated = |m: [[f64; 2]; 2]| -> [[f64; 2]; 2] {
+            let um: [[f64; 2]; 2] = std::array::from_fn(|i| {
+                std::array::from_fn(|k| u[i][0] * m[0][k] + u[i][1] * m[1][k])
+            });
+            std::array::from_fn(|i| {
+                std::array::from_fn(|k| um[i][0] * v[k][0] + um[i][1] * v[k][1])
+            })
+        };
+        // By coordinates of the corners: M : dJ with J = D B.
+        let b = self.inverse;
+        let by_corners = |m: [[f64; 2]; 2]| -> [f64; 6] {
+            let at = |i: usize, k: usize| m[i][0] * b[k][0] + m[i][1] * b[k][1];
+            let (q, r) = ([at(0, 0), at(1, 0)], [at(0, 1), at(1, 1)]);
+            [-q[0] - r[0], -q[1] - r[1], q[0], q[1], r[0], r[1]]
+        };
+        let slope = |s: f64| 2.0 * s - 2.0 / (s * s * s);
+        let (p1, p2) = (slope(s1), slope(s2));
+        let gradient = by_corners(rotated([[p1, 0.0], [0.0, p2]])).map(|x| self.area * x);
+        let cubes = (s1 * s2).powi(3);
+        let half = 0.5f64.sqrt();
+        let modes = [
+            (2.0 + 6.0 / s1.powi(4), [[1.0, 0.0], [0.0, 0.0]]),
+            (2.0 + 6.0 / s2.powi(4), [[0.0, 0.0], [0.0, 1.0]]),
+            (
+                2.0 - 2.0 * (s1 * s1 - s1 * s2 + s2 * s2) / cubes,
+                [[0.0, -half], [half, 0.0]],
+            ),
+            (
+                2.0 + 2.0 * (s1 * s1 + s1 * s2 + s2 * s2) / cubes,
+                [[0.0, half], [half, 0.0]],
+            ),
+        ];
+        let mut hessian = [[0.0; 6]; 6];
+        for (value, mode) in modes {
+            if value <= 0.0 {
+                continue;
+            }
+            let g = by_corners(rotated(mode));
+            for i in 0..6 {
+                for k in 0..6 {
+                    hessian[i][k] += self.area * value * g[i] * g[k];
+                }
+            }
+        }
+        (gradient, hessian)
+    }
+}
+
+/// The state of the iteration.
+struct Problem<'a> {
+    map: &'a GridMap,
+    rest: Vec<Rest>,
+    /// Of every corner: its vertex and the frame that it is seen in.
+    corner: HalfedgeVec<(u32, u8, [i64; 2])>,
+}
+
+impl Problem<'_> {
+    /// Corners of a face for places of vertices, seen from their first corners.
+    fn corners(&self, f: usize, place: &[[f64; 2]]) -> [[f64; 2]; 3] {
+        let corner = &self.corner.as_slice()[3 * f..3 * f + 3];
+        std::array::from_fn(|k| {
+            let (v, turns, shift) = corner[k];
+            let [x, y] = turned(place[v as usize], turns);
+            [x + shift[0] as f64, y + shift[1] as f64]
+        })
+    }
+
+    /// Infinite where a face has no area.
+    fn energy(&self, place: &[[f64; 2]]) -> f64 {
+        let of_face = self.rest.par_iter().enumerate().with_min_len(PIECE);
+        let energies: Vec<f64> = of_face
+            .map(|(f, rest)| rest.energy(self.corners(f, place)))
+            .collect();
+        energies.iter().sum()
+    }
+
+    /// How far all vertices may go along `step` before a face has no area, at most 1 / [`BEFORE_FLAT`] steps.
+    fn longest(&self, place: &[[f64; 2]], step: &[[f64; 2]]) -> f64 {
+        let of_face = (0..self.rest.len()).into_par_iter().with_min_len(PIECE);
+        let longest = of_face.map(|f| {
+            let p = self.corners(f, place);
+            let corner = &self.corner.as_slice()[3 * f..3 * f + 3];
+            let d: [[f64; 2]; 3] = std::array::from_fn(|k| {
+                let (v, turns, _) = corner[k];
+                turned(step[v as usize], turns)
+            });
+            first_root(p, d)
+        });
+        longest.reduce(|| f64::INFINITY, f64::min)
+    }
+}
+
+/// The least positive t at which the triangle p + t d has no area.
+fn first_root(p: [[f64; 2]; 3], d: [[f64; 2]; 3]) -> f64 {
+    let edge = |x: [[f64; 2]; 3], k: usize| [x[k][0] - x[0][0], x[k][1] - x[0][1]];
+    let cross = super::complex::cross;
+    let (a, b, u, v) = (edge(p, 1), edge(p, 2), edge(d, 1), edge(d, 2));
+    let (zero, one, two) = (cross(a, b), cross(a, v) + cross(u, b), cross(u, v));
+    // zero + one t + two t² with zero > 0, from the smaller root without cancellation.
+    let discriminant = one * one - 4.0 * two * zero;
+    if discriminant < 0.0 {
+        return f64::INFINITY;
+    }
+    let s = discriminant.sqrt();
+    let q = -0.5 * (one + if one < 0.0 { -s } else { s });
+    let roots = [q / two, zero / q];
+    let positive = roots.into_iter().filter(|t| *t > 0.0);
+    positive.fold(f64::INFINITY, f64::min)
+}
+
+/// Moves vertices until the energy is least; see the module docs. `unit`: length of a side of a cell, source units.
+pub(crate) fn relax(map: &mut GridMap, unit: f64) -> Result<Relaxed, GridError> {
+    let c = &map.sheet.fine.connectivity;
+    let position = &map.sheet.fine.position;
+    let rest: Vec<Rest> = c
+        .faces()
+        .map(|f| {
+            let in_space = c.face_vertices(f).map(|v| position[v]);
+            Rest::new(in_space, unit, map.corners(f))
+        })
+        .collect();
+    let total: f64 = rest.iter().map(|r| r.area).sum();
+    let mut corner = HalfedgeVec::filled((0, 0, [0; 2]), c.halfedge_count());
+    let mut place = Vec::with_capacity(c.vertex_count());
+    for v in c.vertices() {
+        for (h, turns, shift) in map.frames(v) {
+            corner[h] = (v.raw(), turns, shift);
+        }
+        place.push(map.sheet.at(c.vertex_halfedge(v)));
+    }
+    let problem = Problem { map, rest, corner };
+    let first = problem.energy(&place);
+    if !first.is_finite() {
+        let flat = |f: &FaceId| problem.corners(f.index(), &place);
+        let over: Vec<FaceId> = c.faces().filter(|f| !(double_area(flat(f)) > 0.0)).collect();
+        let face = over.first().copied().unwrap_or(FaceId::new(0));
+        let count = over.len();
+        return Err(GridError::TurnedOver { count, face });
+    }
+    let mut solver = SymmetricSolver::with_blocks(2 * place.len(), 2, &problem.pairs())?;
+    let (mut energy, mut steps) = (first, 0);
+    while steps < MOST_STEPS {
+        let (gradient, diagonal, off_diagonal) = problem.system(&place);
+        factorize(&mut solver, &diagonal, &off_diagonal)?;
+        let mut step: Vec<f64> = gradient.iter().map(|g| -g).collect();
+        solver.solve(&mut step);
+        let slope: f64 = step.iter().zip(&gradient).map(|(s, g)| s * g).sum();
+        let step: Vec<[f64; 2]> = step.chunks_exact(2).map(|s| [s[0], s[1]]).collect();
+        let mut length = (BEFORE_FLAT * problem.longest(&place, &step)).min(1.0);
+        let mut found = None;
+        for _ in 0..MOST_HALVINGS {
+            let moved: Vec<[f64; 2]> = place
+                .iter()
+                .zip(&step)
+                .map(|(p, s)| [p[0] + length * s[0], p[1] + length * s[1]])
+                .collect();
+            let there = problem.energy(&moved);
+            if there <= energy + SUFFICIENT * length * slope {
+                found = Some((moved, there));
+                break;
+            }
+            length *= 0.5;
+        }
+        let Some((moved, there)) = found else { break };
+        steps += 1;
+        let gain = (energy - there) / energy;
+        tracing::trace!(steps, energy = there / total, length, "symmetric Dirichlet");
+        (place, energy) = (moved, there);
+        if gain < LEAST_GAIN && length > 0.5 {
+            break;
+        }
+    }
+    let vertices = problem.map.sheet.fine.connectivity.vertices();
+    drop(problem);
+    for (v, place) in vertices.zip(place) {
+        map.put(v, place);
+    }
+    Ok(Relaxed {
+        steps,
+        energy: [first / total, energy / total],
+    })
+}
+
+/// Factorises, with as little damping as does.
+fn factorize(
+    solver: &mut SymmetricSolver,
+    diagonal: &[f64],
+    off_diagonal: &[f64],
+) -> Result<(), GridError> {
+    let mut result = Ok(());
+    for damping in DAMPINGS {
+        let damped: Vec<f64> = diagonal.iter().map(|d| d * (1.0 + damping)).collect();
+        result = solver.factorize(&damped, off_diagonal);
+        if result.is_ok() {
+            break;
+        }
+    }
+    Ok(result?)
+}
+
+/// Gradient, diagonal and one value a pair.
+type System = (Vec<f64>, Vec<f64>, Vec<f64>);
+
+impl Problem<'_> {
+    /// Couplings of coordinates, face by face: those of a corner, then those of two.
+    fn pairs(&self) -> Vec<[u32; 2]> {
+        let mut pairs = Vec::with_capacity(15 * self.rest.len());
+        for corner in self.corner.as_slice().chunks_exact(3) {
+            for (v, ..) in corner {
+                pairs.push([2 * v, 2 * v + 1]);
+            }
+            for k in 0..3 {
+                let [v, w] = [corner[k].0, corner[(k + 1) % 3].0];
+                for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                    pairs.push([2 * v + a, 2 * w + b]);
+                }
+            }
+        }
+        pairs
+    }
+
+    /// Values for [`pairs`](Self::pairs); coordinates that may not move are coupled with nothing.
+    fn system(&self, place: &[[f64; 2]]) -> System {
+        let of_face = self.rest.par_iter().enumerate().with_min_len(PIECE);
+        let faces: Vec<_> = of_face
+            .map(|(f, rest)| rest.derivatives(self.corners(f, place)))
+            .collect();
+        let n = place.len();
+        let freedom: &VertexVec<Freedom> = &self.map.freedom;
+        let is_free: Vec<bool> = freedom
+            .iter()
+            .flat_map(|f| match f {
+                Freedom::Fixed => [false; 2],
+                Freedom::Along(a) => [*a == 0, *a == 1],
+                Freedom::Free => [true; 2],
+            })
+            .collect();
+        let (mut gradient, mut diagonal) = (vec![0.0; 2 * n], vec![0.0; 2 * n]);
+        let mut off_diagonal = Vec::with_capacity(15 * self.rest.len());
+        for ((g, h), corner) in faces.iter().zip(self.corner.as_slice().chunks_exact(3)) {
+            // In the frame of each vertex: turned back.
+            let (g, h) = turned_back(g, h, [corner[0].1, corner[1].1, corner[2].1]);
+            let index = |k: usize, a: usize| 2 * corner[k].0 as usize + a;
+            let value = |i: [usize; 2], j: [usize; 2]| {
+                let both = is_free[index(i[0], i[1])] && is_free[index(j[0], j[1])];
+                if both { h[2 * i[0] + i[1]][2 * j[0] + j[1]] } else { 0.0 }
+            };
+            for k in 0..3 {
+                for a in 0..2 {
+                    if is_free[index(k, a)] {
+                        gradient[index(k, a)] += g[2 * k + a];
+                        diagonal[index(k, a)] += h[2 * k + a][2 * k + a];
+                    }
+                }
+                off_diagonal.push(value([k, 0], [k, 1]));
+            }
+            for k in 0..3 {
+                let next = (k + 1) % 3;
+                for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                    off_diagonal.push(value([k, a], [next, b]));
+                }
+            }
+        }
+        for (d, free) in diagonal.iter_mut().zip(&is_free) {
+            if !free {
+                *d = 1.0;
+            }
+        }
+        (gradient, diagonal, off_diagonal)
+    }
+}
+
+/// Gradient and Hessian by coordinates in frames that so many quarter turns take to the face's.
+fn turned_back(g: &[f64; 6], h: &[[f64; 6]; 6], turns: [u8; 3]) -> ([f64; 6], [[f64; 6]; 6]) {
+    // Coordinate a of corner k is sign times coordinate from[a] of the face's frame.
+    let source = |i: usize| -> (usize, f64) {
+        let (k, a) = (i / 2, i % 2);
+        match (turns[k], a) {
+            (0, a) => (2 * k + a, 1.0),
+            (1, 0) => (2 * k + 1, 1.0),
+            (1, _) => (2 * k, -1.0),
+            (2, a) => (2 * k + a, -1.0),
+            (_, 0) => (2 * k + 1, -1.0),
+            _ => (2 * k, 1.0),
+        }
+    };
+    let from: [(usize, f64); 6] = std::array::from_fn(source);
+    let gradient = from.map(|(i, s)| s * g[i]);
+    let hessian = from.map(|(i, s)| from.map(|(j, t)| s * t * h[i][j]));
+    (gradient, hessian)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FACE: [[f64; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.2, 0.1], [0.3, 1.1, -0.4]];
+    const CORNERS: [[f64; 2]; 3] = [[0.1, 0.2], [1.3, 0.4], [0.2, 0.9]];
+
+    fn moved(mut corners: [[f64; 2]; 3], i: usize, by: f64) -> [[f64; 2]; 3] {
+        corners[i / 2][i % 2] += by;
+        corners
+    }
+
+    #[test]
+    fn an_isometry_has_energy_four() {
+        let flat = [[0.0; 3], [2.0, 0.0, 0.0], [0.4, 1.0, 0.0]];
+        let rest = Rest::new(flat, 2.0, CORNERS);
+        let corners = [[3.0, 5.0], [3.0, 6.0], [2.5, 5.2]];
+        assert!((rest.energy(corners) / rest.area - 4.0).abs() < 1e-12);
+        assert!((rest.area - 0.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn derivatives_are_those_of_the_energy() {
+        let rest = Rest::new(FACE, 0.8, CORNERS);
+        let (gradient, hessian) = rest.derivatives(CORNERS);
+        let h = 1e-5;
+        for i in 0..6 {
+            let [up, down] = [h, -h].map(|h| rest.energy(moved(CORNERS, i, h)));
+            assert!((gradient[i] - (up - down) / (2.0 * h)).abs() < 1e-6);
+            // This face is stretched, so that nothing is clamped.
+            let [up, down] = [h, -h].map(|h| rest.derivatives(moved(CORNERS, i, h)).0);
+            for k in 0..6 {
+                let slope = (up[k] - down[k]) / (2.0 * h);
+                assert!((hessian[i][k] - slope).abs() < 1e-5, "{i} {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn turns_of_frames_turn_derivatives() {
+        let rest = Rest::new(FACE, 0.8, CORNERS);
+        let turns = [1u8, 2, 3];
+        let own: [[f64; 2]; 3] = std::array::from_fn(|k| turned(CORNERS[k], 4 - turns[k]));
+        let energy = |own: [[f64; 2]; 3]| rest.energy(std::array::from_fn(|k| turned(own[k], turns[k])));
+        let (g, h) = rest.derivatives(CORNERS);
+        let (gradient, _) = turned_back(&g, &h, turns);
+        for (i, g) in gradient.into_iter().enumerate() {
+            let [up, down] = [1e-6, -1e-6].map(|h| energy(moved(own, i, h)));
+            assert!((g - (up - down) / 2e-6).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn roots_are_where_the_area_ends() {
+        let d = [[0.0, 0.1], [-0.5, 0.3], [0.4, -0.6]];
+        let t = first_root(CORNERS, d);
+        let at = |t: f64| double_area(std::array::from_fn(|k| {
+            [CORNERS[k][0] + t * d[k][0], CORNERS[k][1] + t * d[k][1]]
+        }));
+        assert!(t.is_finite() && at(t).abs() < 1e-12 && at(0.5 * t) > 0.0);
+        assert_eq!(first_root(CORNERS, [[1.0, 2.0]; 3]), f64::INFINITY);
+    }
+}

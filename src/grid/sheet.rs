@@ -1,0 +1,404 @@
+//! A surface that lies flat face by face, and straight lines drawn on it.
+//!
+//! *Enters:* a subdivision whose corners have coordinates, each face in a frame of its own, and the quarter turns between frames. *Leaves:* a finer one in which lines are paths of edges.
+//! *Guaranteed:* whatever the rounding, a subdivision with the given surface's topology: a line splits the edges that it meets one after another. *Not guaranteed:* that a path is straight to better than
+//! `near` of the edges beside it, where it uses vertices that are there.
+
+use super::complex::{cross, turned};
+use super::error::GridError;
+use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, HalfedgeId, HalfedgeVec, NONE, VertexId};
+use crate::geometry::subdivision::Subdivision;
+
+/// Least part of an edge that is split off.
+const LEAST_PART: f64 = 1e-12;
+
+/// See the module docs.
+pub(crate) struct Sheet {
+    /// `corner[h].uv`: coordinates of the corner that h leaves, in the frame of its face.
+    pub fine: Subdivision,
+    /// A vector p of a face is p after so many quarter turns in the face beyond a halfedge.
+    pub turns: HalfedgeVec<u8>,
+    /// The line that an edge is part of, [`NONE`] elsewhere.
+    pub line: EdgeVec<u32>,
+    /// A line goes through vertices that lie beside it by less than this part of their distance from its last vertex.
+    near: f64,
+}
+
+/// A place to go to, seen from a corner.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Aim {
+    /// The halfedge that leaves the corner.
+    pub corner: HalfedgeId,
+    /// In the frame of its face.
+    pub target: [f64; 2],
+}
+
+/// How a line goes on from a corner.
+enum Way {
+    /// Along the edge of a halfedge that begins or ends at the corner's vertex.
+    Along(HalfedgeId),
+    /// Into the face.
+    Into,
+}
+
+fn minus([a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
+    [a - c, b - d]
+}
+
+fn length([x, y]: [f64; 2]) -> f64 {
+    x.hypot(y)
+}
+
+fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+impl Sheet {
+    /// Without lines.
+    pub fn new(fine: Subdivision, turns: HalfedgeVec<u8>, near: f64) -> Self {
+        let line = EdgeVec::filled(NONE, fine.connectivity.edge_count());
+        Self {
+            fine,
+            turns,
+            line,
+            near,
+        }
+    }
+
+    /// Forgets all lines.
+    pub fn clear(&mut self) {
+        self.line = EdgeVec::filled(NONE, self.fine.connectivity.edge_count());
+    }
+
+    /// Coordinates of the corner that a halfedge leaves.
+    pub fn at(&self, h: HalfedgeId) -> [f64; 2] {
+        self.fine.corner[h].uv
+    }
+
+    /// From the tail to the head of a halfedge, in the frame of its face.
+    pub fn vector(&self, h: HalfedgeId) -> [f64; 2] {
+        minus(self.at(self.fine.connectivity.next(h)), self.at(h))
+    }
+
+    /// A point of the face of a halfedge in the frame of the face beyond; `None` at the border.
+    pub fn beyond(&self, h: HalfedgeId, p: [f64; 2]) -> Option<[f64; 2]> {
+        let c = &self.fine.connectivity;
+        let t = c.twin(h)?;
+        let [x, y] = turned(minus(p, self.at(h)), self.turns[h]);
+        let [a, b] = self.at(c.next(t));
+        Some([a + x, b + y])
+    }
+
+    /// The same aim from the next corner counterclockwise around its vertex.
+    fn left(&self, aim: Aim) -> Option<Aim> {
+        let c = &self.fine.connectivity;
+        let prev = c.prev(aim.corner);
+        let target = self.beyond(prev, aim.target)?;
+        let corner = c.twin(prev)?;
+        Some(Aim { corner, target })
+    }
+
+    /// The same aim from the next corner clockwise.
+    fn right(&self, aim: Aim) -> Option<Aim> {
+        let c = &self.fine.connectivity;
+        let target = self.beyond(aim.corner, aim.target)?;
+        let corner = c.next(c.twin(aim.corner)?);
+        Some(Aim { corner, target })
+    }
+
+    /// An aim from all corners of its vertex.
+    fn around(&self, aim: Aim) -> Vec<Aim> {
+        let mut all = vec![aim];
+        let mut last = aim;
+        while let Some(next) = self.left(last) {
+            if next.corner == aim.corner {
+                return all;
+            }
+            all.push(next);
+            last = next;
+        }
+        last = aim;
+        while let Some(next) = self.right(last) {
+            all.push(next);
+            last = next;
+        }
+        all
+    }
+
+    /// The angle from where the first halfedge of a vertex goes to another that leaves it, counterclockwise, radians.
+    pub fn bearing(&self, of: HalfedgeId) -> f64 {
+        let c = &self.fine.connectivity;
+        let before = c.outgoing(c.tail(of)).take_while(|&h| h != of);
+        before.map(|h| self.angle(h)).sum()
+    }
+
+    /// The angle of a corner, radians.
+    pub fn angle(&self, h: HalfedgeId) -> f64 {
+        let prev = self.fine.connectivity.prev(h);
+        let (a, b) = (self.vector(h), self.vector(prev).map(|x| -x));
+        cross(a, b).atan2(dot(a, b)).max(0.0)
+    }
+
+    /// The corner of a vertex in which a bearing lies, and its angle in the frame there, radians.
+    pub fn corner_at(&self, v: VertexId, bearing: f64) -> Option<(HalfedgeId, f64)> {
+        let c = &self.fine.connectivity;
+        let angles = c.outgoing(v).map(|h| (h, self.angle(h)));
+        let angles: Vec<(HalfedgeId, f64)> = angles.collect();
+        let total: f64 = angles.iter().map(|a| a.1).sum();
+        let wanted = match c.is_boundary_vertex(v) {
+            true => bearing,
+            false => bearing.rem_euclid(total),
+        };
+        let mut before = 0.0;
+        for (i, &(h, angle)) in angles.iter().enumerate() {
+            if wanted < before + angle || i + 1 == angles.len() {
+                let [x, y] = self.vector(h);
+                return Some((h, y.atan2(x) + wanted - before));
+            }
+            before += angle;
+        }
+        None
+    }
+
+    /// An aim from the corner in which it begins, and the two beside it.
+    pub fn near(&self, aim: Aim) -> Vec<Aim> {
+        let beside = [self.right(aim), Some(aim), self.left(aim)];
+        beside.into_iter().flatten().collect()
+    }
+
+    /// Which corner a straight line takes, and how.
+    fn way(&self, aims: &[Aim]) -> Option<(Aim, Way)> {
+        let c = &self.fine.connectivity;
+        let is_along = |edge: [f64; 2], to: [f64; 2]| {
+            dot(edge, to) > 0.0 && cross(edge, to).abs() <= self.near * length(edge) * length(to)
+        };
+        // The one that ends at the target; or else the longest that ends before it, so that no thin face has all corners on the line.
+        let mut best: Option<([f64; 2], Aim, HalfedgeId)> = None;
+        for &aim in aims {
+            let to = minus(aim.target, self.at(aim.corner));
+            let prev = c.prev(aim.corner);
+            let edges = [
+                (aim.corner, self.vector(aim.corner)),
+                (prev, self.vector(prev).map(|x| -x)),
+            ];
+            for (h, edge) in edges {
+                let part = length(edge) / length(to);
+                let rank = match part {
+                    p if (p - 1.0).abs() <= self.near => [2.0, 0.0],
+                    p if p < 1.0 => [1.0, p],
+                    p => [0.0, -p],
+                };
+                if is_along(edge, to) && best.is_none_or(|(most, ..)| rank > most) {
+                    best = Some((rank, aim, h));
+                }
+            }
+        }
+        if let Some((_, aim, h)) = best {
+            return Some((aim, Way::Along(h)));
+        }
+        let into = aims.iter().find(|aim| {
+            let to = minus(aim.target, self.at(aim.corner));
+            let back = self.vector(c.prev(aim.corner)).map(|x| -x);
+            cross(self.vector(aim.corner), to) >= 0.0 && cross(to, back) > 0.0
+        });
+        into.map(|&aim| (aim, Way::Into))
+    }
+
+    /// Draws a straight line to where `aims` say, seen from some corners of one vertex. The vertex where it ends.
+    pub fn draw(&mut self, aims: Vec<Aim>, line: u32) -> Result<VertexId, GridError> {
+        let mut aims = aims;
+        let lost = |aims: &[Aim], sheet: &Sheet| GridError::Lost {
+            line,
+            face: aims
+                .first()
+                .map_or(FaceId::new(0), |a| sheet.fine.connectivity.face(a.corner)),
+        };
+        for _ in 0..4 * self.fine.connectivity.face_count() + 64 {
+            let (aim, way) = self.way(&aims).ok_or_else(|| lost(&aims, self))?;
+            let c = &self.fine.connectivity;
+            let to = length(minus(aim.target, self.at(aim.corner)));
+            let next = match way {
+                Way::Along(h) => {
+                    let whole = length(self.vector(h));
+                    let is_out = h == aim.corner;
+                    let e = c.edge(h);
+                    if to < (1.0 - self.near) * whole {
+                        // The edge keeps its id for the part at the tail of its first halfedge.
+                        let is_kept = is_out == (c.edge_halfedge(e) == h);
+                        let part = if is_out { to / whole } else { 1.0 - to / whole };
+                        let v = self.split(h, part);
+                        let first = self.fine.connectivity.edge_halfedge(e);
+                        let own = if is_kept { e } else { self.rest(first) };
+                        self.line[own] = line;
+                        return Ok(v);
+                    }
+                    self.line[e] = line;
+                    let end = if is_out { c.next(h) } else { h };
+                    if to <= (1.0 + self.near) * whole {
+                        return Ok(c.tail(end));
+                    }
+                    // Exactly on the line, so that what follows is straight.
+                    let (p, a) = (self.at(aim.corner), self.at(end));
+                    let d = minus(aim.target, p);
+                    let along = dot(minus(a, p), d) / dot(d, d);
+                    let on_line = [p[0] + along * d[0], p[1] + along * d[1]];
+                    self.move_by(end, minus(on_line, a));
+                    Aim {
+                        corner: end,
+                        target: aim.target,
+                    }
+                }
+                Way::Into => {
+                    let opposite = c.next(aim.corner);
+                    let [p, a, b] =
+                        [aim.corner, opposite, c.next(opposite)].map(|h| self.at(h));
+                    let d = minus(aim.target, p);
+                    let (right, left) = (cross(minus(a, p), d), cross(d, minus(b, p)));
+                    let part = right / (right + left);
+                    let across = minus([a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])], p);
+                    let reach = length(d) / length(across);
+                    if reach < 1.0 - self.near {
+                        let weights = [1.0 - reach, reach * (1.0 - part), reach * part];
+                        return Ok(self.put_inside(aim.corner, weights, line));
+                    }
+                    let e = c.edge(opposite);
+                    let is_end = reach <= 1.0 + self.near;
+                    if self.line[e] != NONE && !is_end {
+                        return Err(lost(&aims, self));
+                    }
+                    let target = self.beyond(opposite, aim.target);
+                    let is_first = c.edge_halfedge(e) == opposite;
+                    let m = self.split(opposite, part);
+                    let (spoke, far) = self.split_sides(e, is_first);
+                    self.line[spoke] = line;
+                    if is_end {
+                        return Ok(m);
+                    }
+                    let target = target.ok_or_else(|| lost(&aims, self))?;
+                    let corner = far.ok_or_else(|| lost(&aims, self))?;
+                    Aim { corner, target }
+                }
+            };
+            aims = self.around(next);
+        }
+        Err(lost(&aims, self))
+    }
+
+    /// Moves the vertex of a corner, around which nothing is curved, by what is given in the frame of its face.
+    fn move_by(&mut self, corner: HalfedgeId, by: [f64; 2]) {
+        let aim = Aim {
+            corner,
+            target: self.at(corner),
+        };
+        let corners: Vec<HalfedgeId> = self.around(aim).iter().map(|a| a.corner).collect();
+        let c = &self.fine.connectivity;
+        // The first goes around counterclockwise, the rest clockwise from it again.
+        let mut turns: Vec<u8> = vec![0];
+        for i in 1..corners.len() {
+            let left = c.twin(c.prev(corners[i - 1])) == Some(corners[i]);
+            turns.push(match left {
+                true => turns[i - 1] + self.turns[c.prev(corners[i - 1])],
+                false => {
+                    // From the corner on its left.
+                    let h = c.twin(c.prev(corners[i]));
+                    let at = corners[..i].iter().position(|&k| Some(k) == h).unwrap_or(0);
+                    turns[at] + 4 - self.turns[c.prev(corners[i])]
+                }
+            } & 3);
+        }
+        for (h, turns) in corners.into_iter().zip(turns) {
+            let [x, y] = turned(by, turns);
+            let [a, b] = self.at(h);
+            self.fine.corner[h].uv = [a + x, b + y];
+        }
+    }
+
+    /// Splits the edge of a halfedge, at a part of it from its tail.
+    fn split(&mut self, h: HalfedgeId, part: f64) -> VertexId {
+        let c = &self.fine.connectivity;
+        let e = c.edge(h);
+        let part = part.clamp(LEAST_PART, 1.0 - LEAST_PART);
+        let part = match c.edge_halfedge(e) == h {
+            true => part,
+            false => 1.0 - part,
+        };
+        let sides = [Some(c.edge_halfedge(e)), c.twin(c.edge_halfedge(e))];
+        let moved: Vec<[u8; 2]> = sides
+            .into_iter()
+            .flatten()
+            .map(|h| [self.turns[h], self.turns[c.next(h)]])
+            .collect();
+        let places: Vec<(usize, HalfedgeId)> = sides
+            .into_iter()
+            .flatten()
+            .map(|h| (c.corner(h), c.next(h)))
+            .collect();
+        let vertex = self.fine.split_edge(e, part);
+        for ([own, next], (k, old_next)) in moved.into_iter().zip(places) {
+            let mut turns = [0; 3];
+            turns[k] = own;
+            turns[(k + 1) % 3] = next;
+            turns.into_iter().for_each(|t| {
+                self.turns.push(t);
+            });
+            self.turns[old_next] = 0;
+        }
+        let number = self.line[e];
+        while self.line.len() < self.fine.connectivity.edge_count() {
+            self.line.push(NONE);
+        }
+        // The part beyond the new vertex, the first of the new edges.
+        let h = self.fine.connectivity.edge_halfedge(e);
+        let rest = self.rest(h);
+        self.line[rest] = number;
+        vertex
+    }
+
+    /// The edge that goes on where that of a halfedge was split.
+    fn rest(&self, h: HalfedgeId) -> EdgeId {
+        // h runs a → m; the face beyond m → apex has m → b.
+        let c = &self.fine.connectivity;
+        let spoke = c.twin(c.next(h));
+        spoke.map_or(c.edge(h), |s| c.edge(c.next(s)))
+    }
+
+    /// After a split of an edge: the edge from the new vertex to the apex on the side of its halfedge (or on the other), and a corner of the new vertex on the side across.
+    fn split_sides(&self, e: EdgeId, is_first: bool) -> (EdgeId, Option<HalfedgeId>) {
+        let c = &self.fine.connectivity;
+        // a → m, and beyond the edge m → a.
+        let h = c.edge_halfedge(e);
+        let spoke = c.edge(c.next(h));
+        match (is_first, c.twin(h)) {
+            (true, far) => (spoke, far),
+            (false, Some(t)) => (c.edge(c.prev(t)), Some(c.next(h))),
+            (false, None) => (spoke, None),
+        }
+    }
+
+    /// Puts a vertex into a face, `weights` counted from a corner on, and draws the line from that corner to it.
+    fn put_inside(&mut self, corner: HalfedgeId, weights: [f64; 3], line: u32) -> VertexId {
+        let c = &self.fine.connectivity;
+        let (f, k, faces) = (c.face(corner), c.corner(corner), c.face_count());
+        let mut from_first = [0.0; 3];
+        (0..3).for_each(|i| from_first[(k + i) % 3] = weights[i]);
+        let [_, bc, ca] = c.face_halfedges(f);
+        let outer = [self.turns[bc], self.turns[ca]];
+        let v = self.fine.split_face(f, from_first);
+        for t in [0, outer[0], 0, 0, 0, outer[1]] {
+            self.turns.push(t);
+        }
+        (self.turns[bc], self.turns[ca]) = (0, 0);
+        let c = &self.fine.connectivity;
+        while self.line.len() < c.edge_count() {
+            self.line.push(NONE);
+        }
+        // The face keeps corners a and b; the first new one has the vertex, b and c.
+        let spoke = match k {
+            0 => ca,
+            1 => bc,
+            _ => HalfedgeId::new(3 * faces + 2),
+        };
+        self.line[c.edge(spoke)] = line;
+        v
+    }
+}
