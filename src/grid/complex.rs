@@ -9,6 +9,9 @@ use crate::geometry::ids::{FaceId, HalfedgeId, HalfedgeVec, VertexId, VertexVec}
 /// Sine of an angle below which three points count as on a line.
 const STRAIGHT: f64 = 1e-12;
 
+/// Twice the area over the square of the longest side that faces have at least after a flip that nothing but the lattice asks for.
+const THICK: f64 = 1e-2;
+
 /// A vector after `turns` quarter turns counterclockwise.
 pub fn turned<T: Copy + std::ops::Neg<Output = T>>([x, y]: [T; 2], turns: u8) -> [T; 2] {
     match turns & 3 {
@@ -241,6 +244,19 @@ impl Complex {
         };
         let wide = |a: [f64; 2], b: [f64; 2]| cross(a, b) > STRAIGHT * dot(a, a).max(dot(b, b));
         wide(tn, minus(hp)) && wide(hn, minus(tp))
+    }
+
+    /// Whether both triangles after a flip have areas of at least [`THICK`] of the square of their longest side.
+    pub fn stays_thick(&self, h: HalfedgeId) -> bool {
+        let Some([hn, hp, tn, tp]) = self.quad(h) else {
+            return false;
+        };
+        let is_thick = |a: [f64; 2], b: [f64; 2]| {
+            let c = add(a, b);
+            cross(a, b) >= THICK * dot(a, a).max(dot(b, b)).max(dot(c, c))
+        };
+        // c → a → d and d → b → c.
+        is_thick(hp, tn) && is_thick(tp, hn)
     }
 
     /// Whether the angles opposite a side sum to more than π, by more than rounding.

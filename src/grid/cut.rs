@@ -63,7 +63,7 @@ pub(crate) fn cut(
                 false => mesh.head(out.edge),
                 true => mesh.tail(out.edge),
             };
-            let arrived = draw(map, &anchor, out)?;
+            let arrived = draw(map, &anchor, out, vertex[end])?;
             match vertex[end] {
                 Some(v) if v == arrived.vertex => {}
                 Some(_) => return Err(lost(map, out.edge)),
@@ -92,7 +92,12 @@ fn lost(map: &GridMap, edge: (u32, u8)) -> GridError {
 }
 
 /// Draws one edge of the quad mesh from an anchor. Its end, as an anchor.
-fn draw(map: &mut GridMap, anchor: &Anchor, out: Out) -> Result<Anchor, GridError> {
+fn draw(
+    map: &mut GridMap,
+    anchor: &Anchor,
+    out: Out,
+    goal: Option<VertexId>,
+) -> Result<Anchor, GridError> {
     let bearing = map.bearing(anchor) + f64::from(out.turns) * FRAC_PI_2;
     let found = map.sheet.corner_at(anchor.vertex, bearing);
     let (corner, angle) = found.ok_or_else(|| lost(map, out.edge))?;
@@ -102,7 +107,7 @@ fn draw(map: &mut GridMap, anchor: &Anchor, out: Out) -> Result<Anchor, GridErro
     let target = [x.round() + dx, y.round() + dy];
     let aims = map.sheet.near(Aim { corner, target });
     let (q, k) = out.edge;
-    let v = map.sheet.draw(aims, 4 * q + u32::from(k))?;
+    let v = map.sheet.draw(aims, 4 * q + u32::from(k), goal)?;
     while map.freedom.len() < map.sheet.fine.connectivity.vertex_count() {
         map.freedom.push(Freedom::Free);
     }
@@ -226,9 +231,6 @@ fn settle(map: &mut GridMap, vertex: &[Option<VertexId>]) -> Result<(), GridErro
         .faces()
         .filter(|&f| !(double_area(map.corners(f)) > 0.0))
         .collect();
-    for &f in &over {
-        eprintln!("{f} {:?} {:?} {:?} lines {:?}", c.face_vertices(f), map.corners(f), c.face_vertices(f).map(|v| map.freedom[v]), c.face_edges(f).map(|e| map.sheet.line[e]));
-    }
     match over[..] {
         [] => Ok(()),
         [face, ..] => Err(GridError::TurnedOver {

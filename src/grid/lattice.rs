@@ -197,6 +197,6 @@ impl Lattice {
         };
         let ((c, s), (d, t)) = (corner(h), corner(t));
         // In the metric too: or the map from there to the lattice would turn a face over.
-        c * t + d * s < 0 && complex.is_convex(h)
+        c * t + d * s < 0 && complex.stays_thick(h)
     }
 }

@@ -154,12 +154,7 @@ pub(crate) fn affine(
         }
         let aim = aim(&sheet, lattice, vertex, h)?;
         let aims = sheet.near(aim);
-        let end = sheet.draw(aims, h.raw())?;
-        if end != vertex[complex.head(h)] {
-            let face = sheet.fine.connectivity.face(aim.corner);
-            let line = h.raw();
-            return Err(GridError::Lost { line, face });
-        }
+        sheet.draw(aims, h.raw(), Some(vertex[complex.head(h)]))?;
     }
     let under = flood(&sheet, lattice, vertex)?;
     let real = real_corners(lattice);

@@ -12,6 +12,9 @@ use crate::geometry::subdivision::Subdivision;
 /// Least part of an edge that is split off.
 const LEAST_PART: f64 = 1e-12;
 
+/// The end of a line that is a vertex already is met where its distance is right to this part.
+const GOAL: f64 = 1e-3;
+
 /// See the module docs.
 pub(crate) struct Sheet {
     /// `corner[h].uv`: coordinates of the corner that h leaves, in the frame of its face.
@@ -167,7 +170,7 @@ impl Sheet {
     }
 
     /// Which corner a straight line takes, and how.
-    fn way(&self, aims: &[Aim]) -> Option<(Aim, Way)> {
+    fn way(&self, aims: &[Aim], goal: Option<VertexId>) -> Option<(Aim, Way)> {
         let c = &self.fine.connectivity;
         let is_along = |edge: [f64; 2], to: [f64; 2]| {
             dot(edge, to) > 0.0 && cross(edge, to).abs() <= self.near * length(edge) * length(to)
@@ -183,9 +186,15 @@ impl Sheet {
             ];
             for (h, edge) in edges {
                 let part = length(edge) / length(to);
+                let end = if h == prev { c.tail(h) } else { c.head(h) };
+                let is_end = match goal {
+                    Some(goal) => end == goal && (part - 1.0).abs() <= GOAL,
+                    None => (part - 1.0).abs() <= self.near,
+                };
                 let rank = match part {
-                    p if (p - 1.0).abs() <= self.near => [2.0, 0.0],
+                    _ if is_end => [2.0, 0.0],
                     p if p < 1.0 => [1.0, p],
+                    _ if goal.is_some() => continue,
                     p => [0.0, -p],
                 };
                 if is_along(edge, to) && best.is_none_or(|(most, ..)| rank > most) {
@@ -204,8 +213,8 @@ impl Sheet {
         into.map(|&aim| (aim, Way::Into))
     }
 
-    /// Draws a straight line to where `aims` say, seen from some corners of one vertex. The vertex where it ends.
-    pub fn draw(&mut self, aims: Vec<Aim>, line: u32) -> Result<VertexId, GridError> {
+    /// Draws a straight line to where `aims` say, seen from some corners of one vertex. The vertex where it ends: `goal`, if there is one already.
+    pub fn draw(&mut self, aims: Vec<Aim>, line: u32, goal: Option<VertexId>) -> Result<VertexId, GridError> {
         let mut aims = aims;
         let lost = |aims: &[Aim], sheet: &Sheet| GridError::Lost {
             line,
@@ -214,7 +223,7 @@ impl Sheet {
                 .map_or(FaceId::new(0), |a| sheet.fine.connectivity.face(a.corner)),
         };
         for _ in 0..4 * self.fine.connectivity.face_count() + 64 {
-            let (aim, way) = self.way(&aims).ok_or_else(|| lost(&aims, self))?;
+            let (aim, way) = self.way(&aims, goal).ok_or_else(|| lost(&aims, self))?;
             let c = &self.fine.connectivity;
             let to = length(minus(aim.target, self.at(aim.corner)));
             let next = match way {
@@ -222,7 +231,7 @@ impl Sheet {
                     let whole = length(self.vector(h));
                     let is_out = h == aim.corner;
                     let e = c.edge(h);
-                    if to < (1.0 - self.near) * whole {
+                    if goal.is_none() && to < (1.0 - self.near) * whole {
                         // The edge keeps its id for the part at the tail of its first halfedge.
                         let is_kept = is_out == (c.edge_halfedge(e) == h);
                         let part = if is_out { to / whole } else { 1.0 - to / whole };
@@ -234,7 +243,12 @@ impl Sheet {
                     }
                     self.line[e] = line;
                     let end = if is_out { c.next(h) } else { h };
-                    if to <= (1.0 + self.near) * whole {
+                    let head = c.tail(end);
+                    let is_end = match goal {
+                        Some(goal) => head == goal && to <= (1.0 + GOAL) * whole,
+                        None => to <= (1.0 + self.near) * whole,
+                    };
+                    if is_end {
                         return Ok(c.tail(end));
                     }
                     // Exactly on the line, so that what follows is straight.
@@ -257,12 +271,12 @@ impl Sheet {
                     let part = right / (right + left);
                     let across = minus([a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])], p);
                     let reach = length(d) / length(across);
-                    if reach < 1.0 - self.near {
+                    if goal.is_none() && reach < 1.0 - self.near {
                         let weights = [1.0 - reach, reach * (1.0 - part), reach * part];
                         return Ok(self.put_inside(aim.corner, weights, line));
                     }
                     let e = c.edge(opposite);
-                    let is_end = reach <= 1.0 + self.near;
+                    let is_end = goal.is_none() && reach <= 1.0 + self.near;
                     if self.line[e] != NONE && !is_end {
                         return Err(lost(&aims, self));
                     }
