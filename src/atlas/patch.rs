@@ -9,7 +9,9 @@ pub const MAX_SIDE: usize = 8192;
 /// The domain of one geometry image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Patch {
-    /// Patch coordinates to central-chart coordinates; none for a rectangle, which is no similar picture of it.
+    /// How texels lie in it.
+    pub domain: Domain,
+    /// Patch coordinates to central-chart coordinates; none for a rectangle or a block, which are no similar pictures of it.
     pub to_chart: Option<Similarity>,
     /// Columns of the image.
     pub width: usize,
@@ -22,16 +24,6 @@ pub struct Patch {
     pub packed_scale: f64,
     /// See `packed_scale`.
     pub packed_offset: [f64; 2],
-}
-
-impl Patch {
-    /// How texels lie in it.
-    pub fn domain(&self) -> Domain {
-        match self.to_chart {
-            Some(_) => Domain::Flat,
-            None => Domain::Rectangle,
-        }
-    }
 }
 
 /// What geometry images are sampled over.
@@ -53,6 +45,8 @@ pub enum Domain {
     Flat,
     /// A rectangle, sampled at grid corners from border to border: a full grid.
     Rectangle,
+    /// A block of cells of the integer grid, sampled from border to border.
+    Grid,
 }
 
 impl Domain {
@@ -61,7 +55,7 @@ impl Domain {
     pub fn to_centres(self, texel_to_patch: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
         match self {
             Self::Flat => texel_to_patch,
-            Self::Rectangle => texel_to_patch.map(|[a, b, c]| [a, b, c - 0.5 * (a + b)]),
+            Self::Rectangle | Self::Grid => texel_to_patch.map(|[a, b, c]| [a, b, c - 0.5 * (a + b)]),
         }
     }
 }

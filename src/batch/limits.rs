@@ -108,13 +108,21 @@ const PER_TEXEL: u64 = 350;
 /// Most memory that building an asset is expected to take, bytes: a rule of thumb by which jobs are held back, not a limit.
 #[must_use]
 pub fn estimate(input_bytes: u64, config: &Config) -> u64 {
-    let texels = config.patches.texel_budget as u64;
+    let texels = texels(config);
     let images = match config.images.domain {
-        Domain::Flat => texels.saturating_mul(PER_TEXEL),
+        Domain::Flat | Domain::Grid => texels.saturating_mul(PER_TEXEL),
         Domain::Rectangle => texels.saturating_mul(2 * PER_TEXEL),
     };
     BASE.saturating_add(input_bytes.saturating_mul(PER_BYTE))
         .saturating_add(images)
+}
+
+/// Texels of a mesh, about.
+fn texels(config: &Config) -> u64 {
+    match config.images.domain {
+        Domain::Flat | Domain::Rectangle => config.patches.texel_budget as u64,
+        Domain::Grid => config.grid.texels() as u64,
+    }
 }
 
 /// Time that any mesh takes, milliseconds; this and the following measured with one thread on box.stl (684 bytes), spot.obj (0.3 MiB)
@@ -146,7 +154,7 @@ pub fn expected_time(input_bytes: u64, config: &Config, build: bool) -> u64 {
         return LOOKING_TIME.saturating_add(part(input_bytes, HASHING_TIME_PER_MEBIBYTE));
     }
     let per_mebibyte = match config.images.domain {
-        Domain::Flat => TIME_PER_MEBIBYTE,
+        Domain::Flat | Domain::Grid => TIME_PER_MEBIBYTE,
         Domain::Rectangle => TIME_PER_MEBIBYTE_OF_RECTANGLES,
     };
     let pixels = match config.pictures.enabled {
@@ -155,7 +163,7 @@ pub fn expected_time(input_bytes: u64, config: &Config, build: bool) -> u64 {
     };
     BASE_TIME
         .saturating_add(part(input_bytes, per_mebibyte))
-        .saturating_add(part(config.patches.texel_budget as u64, TIME_PER_MEBITEXEL))
+        .saturating_add(part(texels(config), TIME_PER_MEBITEXEL))
         .saturating_add(part(pixels, TIME_PER_MEBIPIXEL))
 }
 

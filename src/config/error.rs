@@ -205,12 +205,22 @@ pub enum ConfigError {
         file: &'static str,
     },
     /// A key for flat images, but patches that are not flat.
-    #[error("`{key}` {does}, but `images.domain` is \"rectangle\"")]
+    #[error("`{key}` {does}, but `images.domain` is \"{domain}\"")]
     OnlyFlat {
         /// The key.
         key: &'static str,
+        /// The domain.
+        domain: &'static str,
         /// What it does with flat images.
         does: &'static str,
+    },
+    /// A key with which there is no grid, but a grid.
+    #[error("`images.domain` is \"grid\", which needs `{key} = \"{wanted}\"`")]
+    NoGrid {
+        /// The key.
+        key: &'static str,
+        /// What it must be.
+        wanted: &'static str,
     },
     /// A key of an `[[asset]]` table that no single mesh can have.
     #[error("{at}: `{key}` concerns the whole run and not single meshes")]
@@ -251,6 +261,7 @@ impl ConfigError {
             | Self::NoListFile { .. }
             | Self::ListAndFile { .. }
             | Self::OnlyFlat { .. }
+            | Self::NoGrid { .. }
             | Self::OverrideWithoutValue { .. } => None,
             Self::Syntax { at, .. }
             | Self::FileLine { at, .. }
@@ -299,6 +310,9 @@ impl ConfigError {
             Self::ListAndFile { .. } => "remove one of them".to_owned(),
             Self::OnlyFlat { key, .. } => {
                 format!("set `images.domain = \"flat\"`, or leave `{key}` out")
+            }
+            Self::NoGrid { key, .. } => {
+                format!("leave `{key}` out, or set `images.domain = \"flat\"`")
             }
             Self::NotForOneAsset { .. } => "write it outside of the `[[asset]]` tables".to_owned(),
             Self::NotOnePattern { .. } => {

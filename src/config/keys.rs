@@ -509,8 +509,23 @@ pub const KEYS: &[Key] = &[
     ),
     key("patches.shared_lattice", Kind::Bool, "", "false"),
     key(
+        "grid.cells",
+        Kind::Integer {
+            min: 1,
+            max: 1_000_000,
+        },
+        "cells",
+        "2000",
+    ),
+    key(
+        "grid.samples_per_cell",
+        Kind::Integer { min: 1, max: 64 },
+        "texels",
+        "8",
+    ),
+    key(
         "images.domain",
-        Kind::Choice(&["flat", "rectangle"]),
+        Kind::Choice(&["flat", "rectangle", "grid"]),
         "",
         "\"flat\"",
     ),

@@ -10,6 +10,8 @@ use super::overrides::{self, Override};
 use super::presets::Preset;
 use super::source::{Source, refused, syntax};
 use crate::atlas::patch::Domain;
+use crate::flow::cones::ConeStrategy;
+use crate::flow::ricci::Holonomy;
 use toml::de::DeTable;
 
 /// All that was written, in layers.
@@ -34,6 +36,15 @@ impl Layers {
         }
         merge(&mut own, self.set.clone());
         let mut merged = preset_layer(&own)?;
+        let is_grid = |table: &toml::Table| {
+            let domain = table.get("images").and_then(|images| images.get("domain"));
+            domain.map(|domain| domain.as_str() == Some("grid"))
+        };
+        if is_grid(&own).or_else(|| is_grid(&merged)) == Some(true) {
+            let mut implied = parse_layer(&Source::new("grid", GRID))?.0;
+            merge(&mut implied, merged);
+            merged = implied;
+        }
         merge(&mut merged, own);
         // Each layer was accepted alone and a key is replaced as a whole, so this can only fail where
         // a stage relates several of its keys.
@@ -42,12 +53,36 @@ impl Layers {
         let source = self.last.as_ref().unwrap_or(&nowhere);
         let config = config.map_err(|error| refused(source, &error))?;
         match only_flat(&config) {
-            Some((key, does)) if config.images.domain == Domain::Rectangle => {
-                Err(ConfigError::OnlyFlat { key, does })
+            Some((key, does)) if config.images.domain != Domain::Flat => {
+                let domain = match config.images.domain {
+                    Domain::Grid => "grid",
+                    _ => "rectangle",
+                };
+                Err(ConfigError::OnlyFlat { key, domain, does })
             }
-            _ => Ok(config),
+            _ => without_grid(config),
         }
     }
+}
+
+/// What the grid needs: it lies below everything that is written.
+const GRID: &str = "[cones]\nstrategy = \"field\"\n[flow]\nholonomy = \"quarter-turns\"\n";
+
+/// Refuses settings with which there is no grid, where one is asked for.
+fn without_grid(config: Config) -> Result<Config, ConfigError> {
+    if config.images.domain != Domain::Grid {
+        return Ok(config);
+    }
+    let key = match (config.cones.strategy, config.flow.holonomy) {
+        (ConeStrategy::Field, Holonomy::QuarterTurns) => return Ok(config),
+        (ConeStrategy::Field, _) => "flow.holonomy",
+        _ => "cones.strategy",
+    };
+    let wanted = match key {
+        "flow.holonomy" => "quarter-turns",
+        _ => "field",
+    };
+    Err(ConfigError::NoGrid { key, wanted })
 }
 
 /// A key that is given and means nothing but for flat images, and what it does with them.

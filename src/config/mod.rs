@@ -77,6 +77,8 @@ pub struct Config {
     pub flow: FlowParams,
     /// Patches (5.5).
     pub patches: PatchParams,
+    /// The integer grid.
+    pub grid: GridParams,
     /// Geometry images (5.5).
     pub images: ImageParams,
     /// Pictures of the result.

@@ -13,6 +13,7 @@ pub use crate::flow::cones::{BoundaryParams, ConeParams};
 pub use crate::flow::features::FeatureParams;
 pub use crate::flow::refine::RefineParams;
 pub use crate::flow::ricci::FlowParams;
+pub use crate::grid::GridParams;
 pub use crate::read::ReadParams;
 pub use crate::repair::RepairParams;
 

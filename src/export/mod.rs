@@ -24,6 +24,7 @@ pub mod npz;
 pub mod periods;
 pub mod pictures;
 mod provenance;
+mod quads;
 pub mod report;
 #[cfg(test)]
 pub(crate) mod sample;
@@ -92,6 +93,12 @@ pub fn write_component(
         exr::write(&image, &atlas.image_params, &label.to_text(), &mut file)
             .map_err(|e| e.at(file.path()))?;
         file.finish()?;
+        files.push(name);
+    }
+
+    if let Some(grid) = &atlas.grid {
+        let name = inside("quads.obj");
+        staging.write(&name, quads::text(grid).as_bytes())?;
         files.push(name);
     }
 

@@ -7,6 +7,7 @@ use crate::atlas::charts::ChartFace;
 use crate::export::EncodeError;
 use crate::flow::prescription::BoundaryCondition;
 use crate::geometry::ids::{EdgeId, FaceId, NONE, PatchId};
+use crate::grid::Grid;
 use crate::product::AffineAtlas;
 use std::io::{BufWriter, Seek, Write};
 use zip::write::SimpleFileOptions;
@@ -35,6 +36,9 @@ pub fn write<W: Write + Seek>(atlas: &AffineAtlas, writer: W) -> Result<(), Enco
     charts(atlas, &mut archive)?;
     patches(atlas, &mut archive)?;
     seams(atlas, &mut archive)?;
+    if let Some(found) = &atlas.grid {
+        grid(found, &mut archive)?;
+    }
     let mut writer = archive.zip.finish().map_err(zip_error)?;
     writer.flush()?;
     Ok(())
@@ -159,6 +163,24 @@ fn seams<W: Write + Seek>(
     archive.array("seam_patch", &[seams.len(), 2], sides)
 }
 
+fn grid<W: Write + Seek>(grid: &Grid, archive: &mut Archive<W>) -> Result<(), EncodeError> {
+    let f = grid.uv.len();
+    let uv = grid.uv.iter().flatten().flatten().copied();
+    archive.finite("grid_uv", &[f, 3, 2], uv)?;
+    let turns = grid.turns.iter().flatten().copied();
+    archive.array("grid_turns", &[f, 3], turns)?;
+    let shift = grid.shift.iter().flatten().flatten().copied();
+    archive.array("grid_shift", &[f, 3, 2], shift)?;
+    let points = grid.points.iter().flatten().copied();
+    archive.finite("quad_positions", &[grid.points.len(), 3], points)?;
+    let cells = grid.cells_in_blocks();
+    let n = cells.len();
+    let corners = cells.iter().flat_map(|cell| cell.corners);
+    archive.array("quads", &[n, 4], corners)?;
+    archive.array("quad_patch", &[n], cells.iter().map(|cell| cell.block))?;
+    archive.array("quad_cell", &[n, 2], cells.iter().flat_map(|cell| cell.at))
+}
+
 /// Running sums, from 0, one more than there are counts.
 fn offsets(counts: impl Iterator<Item = usize>) -> Result<Vec<u32>, EncodeError> {
     let mut offset = vec![0u32];
@@ -250,6 +272,13 @@ trait Number {
 
 impl Number for f64 {
     const DESCR: &'static str = "<f8";
+    fn little_endian(self) -> impl AsRef<[u8]> {
+        self.to_le_bytes()
+    }
+}
+
+impl Number for i64 {
+    const DESCR: &'static str = "<i8";
     fn little_endian(self) -> impl AsRef<[u8]> {
         self.to_le_bytes()
     }

@@ -3,6 +3,7 @@
 //! A grid of `n` by `m` unit squares, each cut along its rising diagonal, is closed around
 //! (cylinder) or in both directions (torus). The central chart is the rectangle [0, n] × [0, m].
 
+use crate::atlas::patch::Domain;
 use crate::atlas::charts::{Chart, ChartFace, ChartKind, Charts, Gluing, Transition};
 use crate::atlas::cut::{CutGraph, Segment};
 use crate::atlas::develop::Development;
@@ -272,6 +273,8 @@ impl Grid {
             ),
             patches: self.patches(uv),
             images: vec![self.image(&mesh)],
+            grid: None,
+            no_grid: None,
             image_params: ImageParams::default(),
             image_origin: [0.0; 3],
             repair: [("welded_vertices".to_owned(), 0)].into(),
@@ -476,6 +479,7 @@ impl Grid {
             face_patch: FaceVec::filled(PatchId::new(0), uv.len()),
             uv,
             patches: vec![Patch {
+                domain: Domain::Flat,
                 to_chart: Some(Similarity {
                     scale: 1.0,
                     rotation: 0.0,

@@ -4,7 +4,7 @@
 //! blocks; T-junctions are harmless, since both sides have the same squares; the same blocks for the same mesh. *Not guaranteed:* the fewest.
 //!
 //! From every irregular point a line starts along each of its edges and goes straight on, all at the same speed, until it meets another line, an irregular point or the border; lines divide the surface into rectangles (Eppstein, Goodrich, Kim, Tamstorf 2008).
-//! Without irregular points a line or two are put where they are needed. Then two blocks that share a whole side of both become one, the longest sides first.
+//! Without irregular points a line or two are put where they are needed. Then two blocks that share a whole side of both become one, the longest sides first, and one that lies beside itself becomes two.
 
 use super::error::GridError;
 use super::quads::QuadMesh;
@@ -56,6 +56,7 @@ impl QuadMesh {
         walls.race();
         let mut blocks = walls.rectangles()?;
         walls.join(&mut blocks)?;
+        walls.part(&mut blocks)?;
         let sides = walls.sides(&blocks)?;
         Ok(Blocks { blocks, sides })
     }
@@ -82,13 +83,7 @@ impl Walls<'_> {
     /// Points on the border, and those where lines start.
     fn kinds(&self) -> (Vec<bool>, Vec<bool>) {
         let mesh = self.mesh;
-        let mut is_border = vec![false; mesh.points.len()];
-        for (corners, across) in mesh.quads.iter().zip(&mesh.across) {
-            for k in (0..4).filter(|&k| across[k].is_none()) {
-                is_border[corners[k] as usize] = true;
-                is_border[corners[(k + 1) % 4] as usize] = true;
-            }
-        }
+        let is_border = mesh.border();
         let points = mesh.points.iter().zip(&is_border);
         let starts = points.map(|(p, &border)| {
             if border {
@@ -305,6 +300,45 @@ impl Walls<'_> {
             let joined = joined.ok_or(GridError::NoRectangle { square })?;
             blocks[b.min(other)] = joined;
             blocks.remove(b.max(other));
+        }
+    }
+
+    /// Divides blocks that lie beside themselves, as far as they have squares for that.
+    fn part(&mut self, blocks: &mut Vec<Block>) -> Result<(), GridError> {
+        loop {
+            let sides = self.sides(blocks)?;
+            let beside_itself = |(b, of): (usize, &[Vec<Piece>; 4])| {
+                let [w, h] = blocks[b].cells;
+                let own = (0..4).flat_map(|s| of[s].iter().map(move |p| (s, p)));
+                own.filter_map(|(s, p)| p.across.filter(|a| a.0 == b).map(|a| (s, a.1)))
+                    .find_map(|(s, t)| match (s % 2, t % 2) {
+                        // Left and right, bottom and top.
+                        (1, 1) if w > 1 => Some((b, 0)),
+                        (0, 0) if h > 1 => Some((b, 1)),
+                        _ if w.max(h) > 1 => Some((b, usize::from(h > w))),
+                        _ => None,
+                    })
+            };
+            let Some((b, axis)) = sides.iter().enumerate().find_map(beside_itself) else {
+                return Ok(());
+            };
+            let w = blocks[b].cells[0];
+            let half = blocks[b].cells[axis] / 2;
+            for i in 0..blocks[b].cells[1 - axis] {
+                let (at, side) = match axis {
+                    0 => (i * w + half - 1, 1),
+                    _ => ((half - 1) * w + i, 2),
+                };
+                let (q, k) = blocks[b].squares[at];
+                self.put((q, (k + side) & 3));
+            }
+            let second = if axis == 0 { half } else { half * w };
+            let corners = [blocks[b].squares[0], blocks[b].squares[second]];
+            let [one, other] = corners.map(|corner| self.rectangle(corner));
+            let square = corners[0].0;
+            let missing = || GridError::NoRectangle { square };
+            blocks[b] = one.ok_or_else(missing)?;
+            blocks.push(other.ok_or_else(missing)?);
         }
     }
 

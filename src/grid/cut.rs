@@ -9,7 +9,7 @@ use super::map::{Anchor, Freedom, GridMap, double_area};
 use super::quads::QuadMesh;
 use super::sheet::Aim;
 use super::slivers::thicken;
-use crate::geometry::ids::{FaceId, NONE, VertexId};
+use crate::geometry::ids::{FaceId, HalfedgeId, NONE, VertexId};
 use std::collections::VecDeque;
 use std::f64::consts::FRAC_PI_2;
 
@@ -27,12 +27,15 @@ struct Out {
     turns: i32,
 }
 
+/// A point of the quad mesh that is a vertex.
+pub(crate) type Placed = Anchor;
+
 /// Draws borders; see the module docs. The vertex of every point of the quad mesh that lies on one.
 pub(crate) fn cut(
     map: &mut GridMap,
     mesh: &QuadMesh,
     blocks: &Blocks,
-) -> Result<Vec<Option<VertexId>>, GridError> {
+) -> Result<Vec<Option<Placed>>, GridError> {
     let mut is_wall = vec![[false; 4]; mesh.quads.len()];
     for block in &blocks.blocks {
         for s in 0..4 {
@@ -42,11 +45,11 @@ pub(crate) fn cut(
         }
     }
     map.sheet.clear();
-    let mut vertex: Vec<Option<VertexId>> = vec![None; mesh.points.len()];
+    let mut placed: Vec<Option<Placed>> = vec![None; mesh.points.len()];
     let mut waiting = VecDeque::new();
     for anchor in map.anchors.clone() {
         let point = mesh.tail(anchor.edge);
-        vertex[point] = Some(anchor.vertex);
+        placed[point] = Some(anchor);
         waiting.push_back(anchor);
     }
     while let Some(anchor) = waiting.pop_front() {
@@ -63,12 +66,12 @@ pub(crate) fn cut(
                 false => mesh.head(out.edge),
                 true => mesh.tail(out.edge),
             };
-            let arrived = draw(map, &anchor, out, vertex[end])?;
-            match vertex[end] {
-                Some(v) if v == arrived.vertex => {}
+            let arrived = draw(map, &anchor, out, placed[end].map(|p| p.vertex))?;
+            match placed[end] {
+                Some(p) if p.vertex == arrived.vertex => {}
                 Some(_) => return Err(lost(map, out.edge)),
                 None => {
-                    vertex[end] = Some(arrived.vertex);
+                    placed[end] = Some(arrived);
                     waiting.push_back(arrived);
                 }
             }
@@ -79,8 +82,39 @@ pub(crate) fn cut(
         let square = square as u32;
         return Err(GridError::NoRectangle { square });
     }
-    settle(map, &vertex)?;
-    Ok(vertex)
+    settle(map, &placed)?;
+    Ok(placed)
+}
+
+/// The halfedge of the surface with which a side of a square on the border of blocks begins, when borders are drawn.
+pub(crate) fn start(
+    map: &GridMap,
+    mesh: &QuadMesh,
+    placed: &[Option<Placed>],
+    edge: (u32, u8),
+) -> Option<HalfedgeId> {
+    let anchor = placed[mesh.tail(edge)].as_ref()?;
+    let around = mesh.around(anchor.edge);
+    let out = around.iter().find(|o| o.edge == edge && !o.is_backwards)?;
+    let (sheet, c) = (&map.sheet, &map.sheet.fine.connectivity);
+    let bearing = map.bearing(anchor) + f64::from(out.turns) * FRAC_PI_2;
+    let total: f64 = c.outgoing(anchor.vertex).map(|h| sheet.angle(h)).sum();
+    let is_inside = !c.is_boundary_vertex(anchor.vertex);
+    let off = |h: HalfedgeId| {
+        let off = (sheet.bearing(h) - bearing).abs();
+        match is_inside {
+            true => {
+                let off = off.rem_euclid(total);
+                off.min(total - off)
+            }
+            false => off,
+        }
+    };
+    let on_lines = c
+        .outgoing(anchor.vertex)
+        .filter(|&h| sheet.line[c.edge(h)] != NONE || c.twin(h).is_none());
+    let nearest = on_lines.min_by(|&g, &h| off(g).total_cmp(&off(h)));
+    nearest.filter(|&h| off(h) < 0.25 * FRAC_PI_2)
 }
 
 fn lost(map: &GridMap, edge: (u32, u8)) -> GridError {
@@ -184,9 +218,9 @@ impl QuadMesh {
 }
 
 /// Puts vertices exactly where they are to be: those of lines on them, all on multiples of a power of two.
-fn settle(map: &mut GridMap, vertex: &[Option<VertexId>]) -> Result<(), GridError> {
+fn settle(map: &mut GridMap, placed: &[Option<Placed>]) -> Result<(), GridError> {
     let c = map.sheet.fine.connectivity.clone();
-    for &v in vertex.iter().flatten() {
+    for v in placed.iter().flatten().map(|p| p.vertex) {
         map.freedom[v] = Freedom::Fixed;
         let place = map.place(v).map(f64::round);
         map.put(v, place);

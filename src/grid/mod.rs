@@ -1,89 +1,225 @@
 //! The integer grid on an atlas whose transitions are quarter turns: a unit square lattice whose points, lines and cells are the same whatever chart they are seen from.
 //!
-//! [`cone_triangulation`] leaves of the surface triangles between cones; [`mod@quantise`] gives their sides whole numbers of cells; [`quads`] are the unit squares of that lattice, and [`blocks`] rectangles of them.
+//! *Enters:* a charted surface. *Leaves:* the same surface with finer faces, each in one cell block, and a [`Grid`]: grid coordinates, quads, blocks. [`cone_triangulation`] leaves of the surface triangles between cones; [`mod@quantise`] gives their sides
+//! whole numbers of cells; [`quads`] are the unit squares of that lattice, and [`blocks`] rectangles of them. `map` takes the surface there, `dirichlet` makes the map one of little distortion, `cut` draws the borders of blocks on the surface.
 
 pub mod blocks;
 pub mod complex;
+pub mod cone_triangulation;
 pub(crate) mod cut;
 pub(crate) mod dirichlet;
-pub(crate) mod map;
-pub(crate) mod sheet;
-pub(crate) mod slivers;
-pub mod cone_triangulation;
+mod distortion;
 mod error;
 pub mod lattice;
+mod layout;
+pub(crate) mod map;
+mod params;
+mod patches;
 pub mod quads;
 pub mod quantise;
+pub(crate) mod sheet;
+pub(crate) mod slivers;
 #[cfg(test)]
 mod tests;
 mod walk;
 
+pub use distortion::Distortion;
 pub use error::GridError;
+pub use params::GridParams;
 
-#[doc(hidden)]
-pub fn experiment(
-    mesh: &crate::geometry::mesh::Mesh,
-    uv: &crate::geometry::ids::FaceVec<[[f64; 2]; 3]>,
-    is_line: &crate::geometry::ids::EdgeVec<bool>,
-    cells: f64,
-) -> Result<String, GridError> {
-    use crate::geometry::ids::HalfedgeVec;
-    use crate::geometry::subdivision::Subdivision;
-    use std::time::Instant;
-    let c = &mesh.connectivity;
-    let begin = Instant::now();
-    let surface = cone_triangulation::complex(c, uv, is_line)?;
-    let turns: HalfedgeVec<u8> = c.halfedges().map(|h| surface.side(h).turns).collect();
-    let cones = cone_triangulation::reduce(surface, c.vertex_count())?;
-    let lattice = quantise::quantise(&cones.complex, cones.vertex.len(), cells)?;
-    let quantised = begin.elapsed().as_secs_f64();
-    let mut fine = Subdivision::identity(mesh);
-    for h in c.halfedges() {
-        fine.corner[h].uv = uv[c.face(h)][c.corner(h)];
+use crate::atlas::charted::{self, Charted};
+use crate::atlas::geometry_image::GeometryImage;
+use crate::atlas::patches::{PatchLayout, PatchParams};
+use crate::geometry::connectivity::Connectivity;
+use crate::geometry::ids::{EdgeVec, FaceVec, HalfedgeId, HalfedgeVec, VertexId};
+use crate::geometry::mesh::triangle_area;
+use crate::geometry::subdivision::Subdivision;
+use blocks::Blocks;
+use map::GridMap;
+use quads::QuadMesh;
+use std::collections::BTreeSet;
+
+/// A surface's grid; its faces are those of the surface that came with it.
+#[derive(Clone, Debug)]
+pub struct Grid {
+    /// Texels a cell.
+    pub samples_per_cell: usize,
+    /// √(source area / cells), source units.
+    pub cell_size: f64,
+    /// Grid coordinates of the corners of every face, in its frame: multiples of a power of two, so that differences are exact.
+    pub uv: FaceVec<[[f64; 2]; 3]>,
+    /// Quarter turns across the edge opposite every corner.
+    pub turns: FaceVec<[u8; 3]>,
+    /// And the translation: q = R^turns p + shift; zero at a border.
+    pub shift: FaceVec<[[i64; 2]; 3]>,
+    /// The quad mesh.
+    pub quads: QuadMesh,
+    /// Where its points are, source units.
+    pub points: Vec<[f64; 3]>,
+    /// Vertices of the surface that points on borders of blocks are.
+    pub vertex: Vec<Option<VertexId>>,
+    /// Rectangles of squares; the first of each is at its bottom left.
+    pub blocks: Blocks,
+    /// How far the map is from an isometry.
+    pub distortion: Distortion,
+}
+
+/// A cell in its block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cell {
+    /// Points, counterclockwise from the corner at its column and row.
+    pub corners: [u32; 4],
+    /// The block.
+    pub block: u32,
+    /// Column and row there.
+    pub at: [u32; 2],
+}
+
+/// Puts a grid on a surface and its images on that; the surface gets finer faces.
+///
+/// # Errors
+/// Transitions that are no quarter turns, cones that no whole numbers fit, faces too thin for float64.
+pub fn grid(
+    surface: Charted,
+    params: &GridParams,
+    patches: &PatchParams,
+) -> Result<(Charted, PatchLayout, Grid), Box<(Charted, GridError)>> {
+    match made(&surface, params) {
+        Ok((map, grid, located)) => {
+            let surface = charted::lift(surface, &map.sheet.fine);
+            let layout = patches::layout(&surface, &grid, located, patches);
+            Ok((surface, layout, grid))
+        }
+        Err(error) => Err(Box::new((surface, error))),
     }
-    let begin = Instant::now();
+}
+
+fn made(
+    surface: &Charted,
+    params: &GridParams,
+) -> Result<(GridMap, Grid, layout::Located), GridError> {
+    let (mesh, central) = (&surface.mesh, &surface.central.uv);
+    let c = &mesh.connectivity;
+    let flat = cone_triangulation::complex(c, central, &lines(surface))?;
+    let turns: HalfedgeVec<u8> = c.halfedges().map(|h| flat.side(h).turns).collect();
+    let cones = cone_triangulation::reduce(flat, c.vertex_count())?;
+    let lattice = quantise::quantise(&cones.complex, cones.vertex.len(), params.cells as f64)?;
     let quads = lattice.quads()?;
     let blocks = quads.blocks()?;
-    let quadded = begin.elapsed().as_secs_f64();
-    let begin = Instant::now();
+    let mut fine = Subdivision::identity(mesh);
+    for h in c.halfedges() {
+        fine.corner[h].uv = central[c.face(h)][c.corner(h)];
+    }
     let mut map = map::affine(fine, turns, &lattice, &cones.vertex, &quads)?;
-    let overlaid = begin.elapsed().as_secs_f64();
-    let k = &map.sheet.fine.connectivity;
-    let least = k.faces().map(|f| map::double_area(map.corners(f))).fold(f64::INFINITY, f64::min);
-    let over = k.faces().filter(|&f| map::double_area(map.corners(f)) <= 0.0).count();
-    let area: f64 = k.faces().map(|f| 0.5 * map::double_area(map.corners(f))).sum();
-    let mut text = format!(
-        "{} -> {} faces, least {least:.2e} over {over} area {area:.6} of {} quantise {quantised:.2} overlay {overlaid:.2}",
-        c.face_count(), k.face_count(), lattice.cells()
+    slivers::thicken(&mut map);
+    let areas = c.faces().map(|f| triangle_area(mesh.face_positions(f)));
+    let cell_size = (areas.sum::<f64>() / quads.quads.len() as f64).sqrt();
+    let relaxed = dirichlet::relax(&mut map, cell_size)?;
+    tracing::debug!(
+        cones = cones.vertex.len(),
+        cells = quads.quads.len(),
+        blocks = blocks.blocks.len(),
+        steps = relaxed.steps,
+        energy = relaxed.energy[1],
+        "grid"
     );
-    let quality = |p: [[f64; 2]; 3]| {
-        let l = (0..3).map(|k| { let (a, b) = (p[k], p[(k + 1) % 3]); (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2) }).fold(0.0, f64::max);
-        map::double_area(p) / l
+    let placed = cut::cut(&mut map, &quads, &blocks)?;
+    let located = layout::locate(&map, &quads, &blocks, &placed)?;
+    let k = &map.sheet.fine.connectivity;
+    let of_edges = |f, of: &dyn Fn(HalfedgeId) -> [i64; 2]| {
+        let h = k.face_halfedges(f);
+        [of(h[1]), of(h[2]), of(h[0])]
     };
-    let size: f64 = c.faces().map(|f| {
-        let [p, q, r] = mesh.face_positions(f);
-        let s = |a: [f64; 3], b: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| a[i] - b[i]) };
-        let (e, f) = (s(q, p), s(r, p));
-        let x: [f64; 3] = std::array::from_fn(|i| e[(i + 1) % 3] * f[(i + 2) % 3] - e[(i + 2) % 3] * f[(i + 1) % 3]);
-        0.5 * (x[0] * x[0] + x[1] * x[1] + x[2] * x[2]).sqrt()
-    }).sum();
-    let begin = Instant::now();
-    let left = slivers::thicken(&mut map);
-    text += &format!(" thickened {left} in {:.2}", begin.elapsed().as_secs_f64());
-    let begin = Instant::now();
-    match dirichlet::relax(&mut map, (size / lattice.cells() as f64).sqrt()) {
-        Ok(r) => text += &format!(" relaxed {} steps {:.3} -> {:.3} in {:.2}", r.steps, r.energy[0], r.energy[1], begin.elapsed().as_secs_f64()),
-        Err(e) => text += &format!(" {e}"),
+    let grid = Grid {
+        samples_per_cell: params.samples_per_cell,
+        cell_size,
+        uv: k.faces().map(|f| map.corners(f)).collect(),
+        turns: k
+            .faces()
+            .map(|f| {
+                let h = k.face_halfedges(f);
+                let turns = |h: HalfedgeId| match k.twin(h) {
+                    Some(_) => map.sheet.turns[h],
+                    None => 0,
+                };
+                [turns(h[1]), turns(h[2]), turns(h[0])]
+            })
+            .collect(),
+        shift: k.faces().map(|f| of_edges(f, &|h| map.shift(h))).collect(),
+        distortion: distortion::measure(&map, &quads, &located.points, cell_size),
+        points: located.points.clone(),
+        vertex: placed.iter().map(|p| p.as_ref().map(|p| p.vertex)).collect(),
+        quads,
+        blocks,
+    };
+    Ok((map, grid, located))
+}
+
+/// Edges on lines of the metric: features; borders are lines anyway.
+fn lines(surface: &Charted) -> EdgeVec<bool> {
+    let c: &Connectivity = &surface.mesh.connectivity;
+    let lines = surface.metric.quarter_turns.iter().flat_map(|met| &met.lines);
+    let pairs = lines.flat_map(|line| line.vertices.windows(2));
+    let sorted = |a: VertexId, b: VertexId| [a.min(b), a.max(b)];
+    let pairs: BTreeSet<[VertexId; 2]> = pairs.map(|w| sorted(w[0], w[1])).collect();
+    let is_line = |e| {
+        let [a, b] = c.edge_vertices(e);
+        pairs.contains(&sorted(a, b))
+    };
+    c.edges().map(is_line).collect()
+}
+
+impl Grid {
+    /// Number of cells.
+    pub fn cells(&self) -> usize {
+        self.quads.quads.len()
     }
-    let begin = Instant::now();
-    match cut::cut(&mut map, &quads, &blocks) {
-        Ok(v) => {
-            let k = &map.sheet.fine.connectivity;
-            let least = k.faces().map(|f| quality(map.corners(f))).fold(f64::INFINITY, f64::min);
-            let area: f64 = k.faces().map(|f| 0.5 * map::double_area(map.corners(f))).sum();
-            text += &format!(" quads {quadded:.2} {} blocks cut {} points {} faces thinnest {least:.1e} area {area:.9} in {:.2}", blocks.blocks.len(), v.iter().flatten().count(), k.face_count(), begin.elapsed().as_secs_f64());
+
+    /// All cells, in the order of squares.
+    pub fn cells_in_blocks(&self) -> Vec<Cell> {
+        let none = Cell {
+            corners: [0; 4],
+            block: 0,
+            at: [0; 2],
+        };
+        let mut cells = vec![none; self.cells()];
+        for (b, block) in self.blocks.blocks.iter().enumerate() {
+            let w = block.cells[0];
+            for (i, &(q, k)) in block.squares.iter().enumerate() {
+                let corners = self.quads.quads[q as usize];
+                cells[q as usize] = Cell {
+                    corners: std::array::from_fn(|j| corners[(usize::from(k) + j) % 4]),
+                    block: b as u32,
+                    at: [(i % w) as u32, (i / w) as u32],
+                };
+            }
         }
-        Err(e) => text += &format!(" CUT {e}"),
+        cells
     }
-    Ok(text)
+
+    /// Points whose number of edges is not 4, or 3 on the border.
+    pub fn irregular(&self) -> Vec<usize> {
+        let is_border = self.quads.border();
+        let points = self.quads.points.iter().zip(&is_border).enumerate();
+        points
+            .filter(|(_, (p, border))| p.valence != if **border { 3 } else { 4 })
+            .map(|(i, _)| i)
+            .collect()
+    }
+
+    /// Makes texels on common sides of images the same to the last bit.
+    pub fn unite(&self, images: &mut [GeometryImage]) {
+        layout::shared_texels(&self.quads, &self.blocks, self.samples_per_cell, |from, to| {
+            let at = |[b, column, row]: [usize; 3]| (b, images[b].width * row + column);
+            let ((b, i), (d, j)) = (at(from), at(to));
+            let (position, normal, log_scale) = (
+                images[b].position[i],
+                images[b].normal[i],
+                images[b].log_scale[i],
+            );
+            images[d].position[j] = position;
+            images[d].normal[j] = normal;
+            images[d].log_scale[j] = log_scale;
+        });
+    }
 }

@@ -42,6 +42,18 @@ pub struct QuadMesh {
 }
 
 impl QuadMesh {
+    /// Whether points are on the border.
+    pub fn border(&self) -> Vec<bool> {
+        let mut is_border = vec![false; self.points.len()];
+        for (corners, across) in self.quads.iter().zip(&self.across) {
+            for k in (0..4).filter(|&k| across[k].is_none()) {
+                is_border[corners[k] as usize] = true;
+                is_border[corners[(k + 1) % 4] as usize] = true;
+            }
+        }
+        is_border
+    }
+
     /// Of every vertex of the complex: the side that leaves it before the first edge counterclockwise, the direction of that edge in the frame of the side's face, and the square and side that it is.
     pub fn first_edges(&self, lattice: &Lattice) -> Vec<(HalfedgeId, u8, (u32, u8))> {
         let vertices = self.points.iter().zip(&self.first);

@@ -35,6 +35,7 @@ use crate::export::folder::list_files;
 use crate::flow::cones::{self, Requests};
 use crate::geometry::deviation::{Triangles, distances};
 use crate::geometry::mesh::Soup;
+use crate::grid;
 use crate::observe::Observer;
 use crate::outcome::{AssetOutcome, AssetState, ComponentOutcome, Failure, Summary};
 use crate::product::AffineAtlas;
@@ -157,17 +158,6 @@ fn build_component(
         central.turn(-axis);
     }
     let charts = charts::chart(c, &cut, &central, &layout, &unfolded, &prescription)?;
-    enter("patches")?;
-    let under = Some((&layout, &unfolded));
-    let patches = patches::layout(
-        &mesh,
-        &metric.length,
-        &cut,
-        &central,
-        under,
-        config.images.domain,
-        &config.patches,
-    )?;
     let surface = Charted {
         mesh,
         metric,
@@ -176,12 +166,47 @@ fn build_component(
         central,
         charts,
     };
+    let in_patches = |surface: &Charted, domain: Domain| {
+        let under = Some((&layout, &unfolded));
+        patches::layout(
+            &surface.mesh,
+            &surface.metric.length,
+            &surface.cut,
+            &surface.central,
+            under,
+            domain,
+            &config.patches,
+        )
+    };
+    let (mut grid, mut no_grid) = (None, None);
     let (surface, patches) = match config.images.domain {
-        Domain::Flat => (surface, patches),
+        Domain::Flat => {
+            enter("patches")?;
+            let patches = in_patches(&surface, Domain::Flat)?;
+            (surface, patches)
+        }
         Domain::Rectangle => {
+            enter("patches")?;
+            let patches = in_patches(&surface, Domain::Rectangle)?;
             enter("rectangles")?;
             let tolerance = config.flow.curvature_tolerance;
             rectangles::rectangles(surface, &patches, &config.patches, tolerance)?
+        }
+        Domain::Grid => {
+            enter("grid")?;
+            match grid::grid(surface, &config.grid, &config.patches) {
+                Ok((surface, patches, found)) => {
+                    grid = Some(found);
+                    (surface, patches)
+                }
+                Err(refused) => {
+                    let (surface, error) = *refused;
+                    no_grid = Some(error);
+                    enter("patches")?;
+                    let patches = in_patches(&surface, Domain::Flat)?;
+                    (surface, patches)
+                }
+            }
         }
     };
     let Charted {
@@ -200,6 +225,10 @@ fn build_component(
         Some(source) => geometry_image::sample_attributes(&mesh, &patches, images, source),
         None => images,
     };
+    let mut images = images;
+    if let Some(grid) = &grid {
+        grid.unite(&mut images);
+    }
     enter("report")?;
     let topology = mesh.connectivity.topology();
     let quality = report::measure(&mesh, &metric, &cut, &central, &charts, &prescription);
@@ -238,6 +267,8 @@ fn build_component(
         central,
         charts,
         patches,
+        grid,
+        no_grid,
         images,
         image_params: config.images.clone(),
         image_origin,
@@ -346,6 +377,9 @@ fn warnings(atlas: &AffineAtlas, config: &Config) -> Vec<String> {
             "has {} of {all} features as lines: the others cannot be lines with these, or only in faces without width; atlas.json names them, and a larger features.angle asks for fewer",
             met.lines.len()
         ));
+    }
+    if let Some(error) = &atlas.no_grid {
+        notes.push(format!("has flat patches instead of a grid: {error}"));
     }
     let params = &config.patches;
     let count = atlas.patches.patches.len();

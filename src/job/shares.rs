@@ -15,6 +15,9 @@ const WHOLE: f64 = 1.0 / 16.0;
 /// No component gets fewer texels: the least that the configuration may ask for.
 const LEAST_TEXELS: usize = 4096;
 
+/// No component gets fewer cells.
+const LEAST_CELLS: usize = 6;
+
 /// No longer side of a picture gets shorter.
 const LEAST_SIDE: usize = 2 * SIDE_RANGE[0];
 
@@ -52,6 +55,7 @@ pub(super) fn of_share(config: &Config, share: f64) -> Config {
     };
     config.patches.texel_budget =
         at_least(config.patches.texel_budget, share, LEAST_TEXELS).min(config.patches.texel_budget);
+    config.grid.cells = at_least(config.grid.cells, share, LEAST_CELLS);
     config.pictures.size =
         at_least(config.pictures.size, share, LEAST_SIDE).min(config.pictures.size);
     config

@@ -42,7 +42,7 @@ impl AffineAtlas {
             length(&mut gluing.residual);
         }
         // Coordinates of a rectangle are shares of its width, whatever the units.
-        let has_units = |patch: &Patch| patch.domain() == Domain::Flat;
+        let has_units = |patch: &Patch| patch.domain == Domain::Flat;
         let units: Vec<bool> = self.patches.patches.iter().map(has_units).collect();
         let side = |patch: PatchId, p: &mut [f64; 2]| {
             if units[patch.index()] {
@@ -83,6 +83,11 @@ impl AffineAtlas {
         length(&mut self.quality.layout_closing_error);
         length(&mut self.quality.cut_length);
         self.quality.image_hausdorff.iter_mut().for_each(length);
+        if let Some(grid) = &mut self.grid {
+            length(&mut grid.cell_size);
+            let points = grid.points.iter_mut();
+            points.for_each(|p| *p = frame.leave(*p));
+        }
         if let Some(distance) = &mut self.image_distance {
             distance.as_mut_slice().iter_mut().for_each(length);
         }

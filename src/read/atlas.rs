@@ -187,7 +187,7 @@ struct Head {
 }
 
 /// Names of the domains.
-const DOMAINS: [&str; 2] = ["flat", "rectangle"];
+const DOMAINS: [&str; 3] = ["flat", "rectangle", "grid"];
 
 #[derive(Deserialize)]
 struct Patch {
@@ -369,7 +369,7 @@ fn image(folder: &Path, patch: &Patch) -> Result<StoredImage, FolderError> {
                 width: patch.width,
                 height: patch.height,
                 texel_to_patch: patch.texel_to_patch,
-                is_rectangle: patch.domain == DOMAINS[1],
+                is_rectangle: patch.domain != DOMAINS[0],
                 position: r
                     .into_iter()
                     .zip(g)

@@ -96,7 +96,7 @@ pub(super) fn checked(images: &Images, frames: &[Frame]) -> Result<Vec<Seam>, Re
     for (id, seam) in images.seams.iter().enumerate() {
         check(id, seam, frames)?;
     }
-    let is_whole = |patch: PatchId| images.patches[patch.index()].domain == Domain::Rectangle;
+    let is_whole = |patch: PatchId| images.patches[patch.index()].domain != Domain::Flat;
     let is_border = |seam: &&Seam| !(is_whole(seam.left) && seam.is_inner());
     Ok(images.seams.iter().filter(is_border).cloned().collect())
 }

@@ -24,7 +24,7 @@ pub enum RebuildError {
     },
     /// Texels cannot be placed in the patch.
     #[error(
-        "texel_to_patch of patch {patch} has determinant {determinant:e}; it must be negative (row 0 at the top) and finite"
+        "texel_to_patch of patch {patch} has determinant {determinant:e}; it must be finite and not zero"
     )]
     Transform {
         /// Patch.

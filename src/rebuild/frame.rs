@@ -1,7 +1,7 @@
 //! The lattice of an image: patch coordinates in texels, with v up.
 //!
-//! Lattice point (i, k) is the texel centre (i + ½, k + ½), where k counts rows from the bottom, so that the lattice
-//! is oriented like the patch.
+//! Lattice point (i, k) is the texel centre (i + ½, k + ½), where k counts rows from the bottom of the patch, so that the lattice
+//! is oriented like it: images of blocks begin with the bottom row, all others with the top row.
 
 use super::{PatchImage, RebuildError};
 
@@ -12,6 +12,8 @@ pub(super) struct Frame {
     pub height: usize,
     texel_to_patch: [[f64; 3]; 2],
     determinant: f64,
+    /// Whether row 0 is at the bottom of the patch.
+    is_up: bool,
 }
 
 impl Frame {
@@ -38,7 +40,7 @@ impl Frame {
         let finite = [a, b, c, d, e, f, 1.0 / determinant]
             .iter()
             .all(|x| x.is_finite());
-        if !(finite && determinant < 0.0) {
+        if !finite {
             return Err(RebuildError::Transform {
                 patch: id,
                 determinant,
@@ -59,6 +61,7 @@ impl Frame {
             height,
             texel_to_patch: patch.texel_to_patch,
             determinant,
+            is_up: determinant > 0.0,
         })
     }
 
@@ -68,24 +71,35 @@ impl Frame {
         let (x, y) = (p[0] - c, p[1] - f);
         let column = (e * x - b * y) / self.determinant;
         let row = (a * y - d * x) / self.determinant;
-        [column, self.height as f64 - row]
+        match self.is_up {
+            true => [column, row],
+            false => [column, self.height as f64 - row],
+        }
     }
 
     /// A vector in texels in patch coordinates.
     pub fn vector(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        self.texel_to_patch.map(|r| r[0] * x - r[1] * y)
+        let y = if self.is_up { y } else { -y };
+        self.texel_to_patch.map(|r| r[0] * x + r[1] * y)
     }
 
     /// Patch coordinates of the lattice point (i, k).
     pub fn centre(&self, i: usize, k: usize) -> [f64; 2] {
         let column = i as f64 + 0.5;
-        let row = (self.height - k) as f64 - 0.5;
+        let row = self.row(k) as f64 + 0.5;
         self.texel_to_patch
             .map(|r| r[0] * column + r[1] * row + r[2])
     }
 
     /// Where the lattice point (i, k) stands in the image's data.
     pub fn index(&self, i: usize, k: usize) -> usize {
-        self.width * (self.height - 1 - k) + i
+        self.width * self.row(k) + i
+    }
+
+    fn row(&self, k: usize) -> usize {
+        match self.is_up {
+            true => k,
+            false => self.height - 1 - k,
+        }
     }
 }

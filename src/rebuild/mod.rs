@@ -79,8 +79,8 @@ impl<'a> Images<'a> {
                 .map(|(patch, image)| PatchImage {
                     width: image.width,
                     height: image.height,
-                    domain: patch.domain(),
-                    texel_to_patch: patch.domain().to_centres(patch.texel_to_patch),
+                    domain: patch.domain,
+                    texel_to_patch: patch.domain.to_centres(patch.texel_to_patch),
                     position: &image.position,
                     alpha: &image.alpha,
                 })

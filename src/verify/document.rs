@@ -380,7 +380,7 @@ fn stray_ids(document: &Document) -> Vec<String> {
         if !is_inside(&patch.image) {
             stray.push(format!("image {:?} outside the folder", patch.image));
         }
-        if patch.domain != "flat" && patch.domain != "rectangle" {
+        if !["flat", "rectangle", "grid"].contains(&patch.domain.as_str()) {
             stray.push(format!("patch {row} of domain {}", patch.domain));
         }
     }

@@ -265,7 +265,7 @@ impl<'a> Raster<'a> {
             .iter()
             .filter(|a| **a != 0.0 && **a != 1.0)
             .count();
-        if self.patch.domain == "rectangle" {
+        if self.patch.domain != "flat" {
             tally.uncovered += image.alpha.iter().filter(|a| **a < 0.5).count();
         }
         let Some(to_texel) = self.to_texel() else {

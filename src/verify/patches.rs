@@ -168,7 +168,7 @@ fn check_inside(
         ]
         .map(|(a, b)| [a, b].map(|corner| at_corner(&arrays.patch_uv, corner)));
         let patch = document.patches.get(arrays.patch[f] as usize);
-        let may_lie_across = patch.is_some_and(|patch| patch.domain == "rectangle");
+        let may_lie_across = patch.is_some_and(|patch| patch.domain != "flat");
         if cut[h] != 0 && !(may_lie_across && ends.iter().all(|[a, b]| a == b)) {
             continue;
         }
@@ -239,9 +239,8 @@ fn measure(
             range = [range[0].min(scale), range[1].max(scale)];
         }
     }
-    // `rectangle` patches are not similar to the chart.
-    let is_rectangle = patch.domain == "rectangle" && patch.patch_to_chart.is_none();
-    let lacks_map = patch.patch_to_chart.is_none() && !is_rectangle;
+    // Rectangles and blocks of a grid are not similar to the chart.
+    let lacks_map = patch.patch_to_chart.is_none() && patch.domain == "flat";
     let flipped = faces.iter().any(|f| !is_positive(uv(*f), reach));
     let tolerance = OVERLAP_TOLERANCE * diameter;
     let cut = arrays.cut.as_flattened();

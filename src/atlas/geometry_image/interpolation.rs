@@ -7,8 +7,12 @@ use crate::geometry::mesh::norm;
 /// A point of a patch in texels, such that texels are sampled at halves. The sides of a rectangle come to lie on the first and the
 /// last column and row to the last bit.
 pub(super) fn in_texels(patch: &Patch, p: [f64; 2]) -> [f64; 2] {
-    match patch.domain() {
+    match patch.domain {
         Domain::Flat => to_texel(&patch.texel_to_patch, p),
+        Domain::Grid => {
+            let samples = 1.0 / patch.texel_to_patch[0][0];
+            p.map(|x| x * samples.round() + 0.5)
+        }
         Domain::Rectangle => {
             let height = patch.texel_to_patch[1][2];
             let last = [patch.width, patch.height].map(|n| n.saturating_sub(1) as f64);

@@ -52,7 +52,7 @@ fn side(patch: &Patch, points: [[f64; 2]; 2]) -> Option<Side> {
     let height = patch.texel_to_patch[1][2];
     let on = |i: usize, value: f64| points.iter().all(|p| p[i] == value);
     let lies = [on(1, 0.0), on(0, 1.0), on(1, height), on(0, 0.0)];
-    let is_rectangle = patch.domain() == Domain::Rectangle;
+    let is_rectangle = patch.domain == Domain::Rectangle;
     lies.iter().position(|&lies| lies && is_rectangle)
 }
 
@@ -84,6 +84,7 @@ mod tests {
     fn rectangle([width, height]: [usize; 2], top: f64) -> Patch {
         let [columns, rows] = [width, height].map(|n| (n - 1) as f64);
         Patch {
+            domain: Domain::Rectangle,
             to_chart: None,
             width,
             height,

@@ -106,7 +106,7 @@ pub fn layout(
     let (sets, range) = segment_into(&slit, domain, params);
     let mut divider = Divider::new(&slit, params);
     let sets = match domain {
-        Domain::Flat => divider.divide(sets, range),
+        Domain::Flat | Domain::Grid => divider.divide(sets, range),
         // All else is decided where lines may cross faces.
         Domain::Rectangle => divider.divide_along_creases(sets),
     };

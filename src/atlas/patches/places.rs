@@ -7,7 +7,7 @@ use super::params::PatchParams;
 use super::rectangle::Oriented;
 use super::resolution::{self, Raster};
 use super::{lattice, packing};
-use crate::atlas::patch::{PackedPlaces, Patch};
+use crate::atlas::patch::{Domain, PackedPlaces, Patch};
 
 /// Gives patches images of square texels and their places in the packed square.
 pub(super) fn with_images(
@@ -47,6 +47,7 @@ pub(super) fn images(
         .zip(&rasters)
         .zip(in_square(&lows, &contents, &corners, side))
         .map(|((patch, raster), (packed_scale, packed_offset))| Patch {
+            domain: Domain::Flat,
             to_chart: Some(patch.to_chart),
             width: raster.width,
             height: raster.height,

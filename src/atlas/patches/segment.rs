@@ -94,7 +94,7 @@ pub(super) fn segment(slit: &Slit, range: f64, domain: Domain) -> Vec<Vec<FaceId
     }
     // A small flat image costs less than the ragged border that a crumb leaves in its neighbours.
     in_order(match domain {
-        Domain::Flat => patches,
+        Domain::Flat | Domain::Grid => patches,
         Domain::Rectangle => widen(slit, patches, range, &mut own),
     })
 }

@@ -17,7 +17,7 @@ use super::{
     place, quadrangulate, quads, relax, sizes, walls,
 };
 use crate::atlas::geometry_image::{GeometryImage, sample};
-use crate::atlas::patches::{Patch, PatchLayout, PatchParams, packed, seams};
+use crate::atlas::patches::{Domain, Patch, PatchLayout, PatchParams, packed, seams};
 use crate::atlas::texels::{Bend, FINER};
 use crate::geometry::ids::{EdgeVec, FaceVec, PatchId};
 use crate::geometry::mesh::{Mesh, cross, norm, sub};
@@ -260,6 +260,7 @@ fn patches(rectangles: &[Rectangle], samples: &[[usize; 2]], params: &PatchParam
         .zip(places)
         .map(
             |(&([width, height], top), (packed_scale, packed_offset))| Patch {
+                domain: Domain::Rectangle,
                 to_chart: None,
                 width,
                 height,

@@ -1,5 +1,6 @@
 //! The document key by key, in the order in which it is written.
 
+use super::grid::{Grid, SidePiece};
 use crate::atlas::geometry_image::{Channel, Precision};
 use crate::atlas::patches::Domain;
 use crate::flow::refine::ConnectivityRepair;
@@ -48,6 +49,9 @@ pub struct Document {
     /// Two period vectors of a flat torus, in central-chart coordinates.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub periods: Option<[[f64; 2]; 2]>,
+    /// The integer grid; absent where patches are no blocks of one.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub grid: Option<Grid>,
     /// Domains of the geometry images.
     pub patches: Vec<Patch>,
     /// What the images hold; absent where that is normal, face and log scale, all of 32 bits, and no image of all patches is there.
@@ -307,6 +311,15 @@ pub struct Patch {
     pub height: usize,
     /// (column, row, 1) to patch coordinates.
     pub texel_to_patch: [[f64; 3]; 2],
+    /// Of a block: cells along its first and second axis.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub cells: Option<[usize; 2]>,
+    /// Of a block: texels on a side of a cell.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub samples_per_cell: Option<usize>,
+    /// Of a block: what lies across its bottom, right, top and left.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub sides: Option<[Vec<SidePiece>; 4]>,
     /// Patch coordinates to central-chart coordinates; null for a rectangle.
     pub patch_to_chart: Option<Similarity>,
     /// Patch coordinates to the unit square of `surface.glb`, v up.

@@ -3,9 +3,11 @@
 //! The structs of [`Document`] are the file, key by key. Every float is written with the shortest decimals that read back to the same 64 bits.
 
 mod document;
+mod grid;
 mod text;
 
 pub use document::*;
+pub use grid::{Grid, Irregular, SidePiece};
 
 use crate::atlas::charts::ChartKind;
 use crate::atlas::geometry_image::ImageParams;
@@ -75,6 +77,7 @@ pub fn describe(atlas: &AffineAtlas, provenance: &Provenance) -> Result<Document
         charts: charts(atlas),
         transitions: transitions(atlas),
         periods: periods::period_vectors(atlas),
+        grid: atlas.grid.as_ref().map(grid::grid),
         patches: patches(atlas),
         images: images(atlas),
         quality: atlas.quality,
@@ -248,10 +251,13 @@ fn patches(atlas: &AffineAtlas) -> Vec<Patch> {
         .map(|(id, patch)| Patch {
             id,
             image: image_path(id),
-            domain: patch.domain(),
+            domain: patch.domain,
             width: patch.width,
             height: patch.height,
             texel_to_patch: patch.texel_to_patch,
+            cells: atlas.grid.as_ref().map(|grid| grid.blocks.blocks[id].cells),
+            samples_per_cell: atlas.grid.as_ref().map(|grid| grid.samples_per_cell),
+            sides: atlas.grid.as_ref().map(|grid| grid::sides(grid, id)),
             patch_to_chart: patch.to_chart.map(|map| Similarity {
                 scale: map.scale,
                 rotation: wrap_angle(map.rotation),

@@ -4,7 +4,13 @@ use super::Document;
 use crate::export::ExportError;
 
 /// Keys whose value may be null; any other null is a number that JSON cannot hold.
-const MAY_BE_NULL: [&str; 2] = ["source_vertex", "patch_to_chart"];
+const MAY_BE_NULL: [&str; 5] = [
+    "source_vertex",
+    "patch_to_chart",
+    "patch",
+    "side",
+    "other_start",
+];
 
 impl Document {
     /// The text of the file: indented, keys in the order of the fields, arrays of numbers on one line,

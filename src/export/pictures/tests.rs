@@ -1,6 +1,7 @@
 //! Pictures of small atlases made by hand.
 
 use super::*;
+use crate::atlas::patch::Domain;
 use crate::atlas::charts::Charts;
 use crate::atlas::cut::{CutGraph, Segment};
 use crate::atlas::develop::Development;
@@ -96,6 +97,7 @@ fn torus(n: u32, m: u32, k: f64) -> AffineAtlas {
     let extent = (high[0] - low[0]).max(high[1] - low[1]);
     let half = |f: usize| f / (face_count / 2).max(1);
     let patch = |p: usize| Patch {
+        domain: Domain::Flat,
         to_chart: Some(Similarity {
             scale: 1.0,
             rotation: 0.0,
@@ -161,6 +163,8 @@ fn torus(n: u32, m: u32, k: f64) -> AffineAtlas {
             packed: None,
         },
         images: vec![],
+        grid: None,
+        no_grid: None,
         image_params: ImageParams::default(),
         image_origin: [0.0; 3],
         repair: Default::default(),

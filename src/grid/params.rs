@@ -1,0 +1,30 @@
+//! How fine the grid is.
+
+use serde::{Deserialize, Serialize};
+
+/// `[grid]`: the integer grid, where `images.domain = "grid"`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GridParams {
+    /// Cells of a mesh, shared among its components by area: as near as its cones allow, which need about ten each.
+    pub cells: usize,
+    /// Texels on a side of a cell.
+    pub samples_per_cell: usize,
+}
+
+impl GridParams {
+    /// Texels of all cells, about.
+    pub fn texels(&self) -> usize {
+        let of_cell = self.samples_per_cell.saturating_mul(self.samples_per_cell);
+        self.cells.saturating_mul(of_cell)
+    }
+}
+
+impl Default for GridParams {
+    fn default() -> Self {
+        Self {
+            cells: 2000,
+            samples_per_cell: 8,
+        }
+    }
+}
