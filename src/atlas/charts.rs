@@ -86,6 +86,26 @@ pub struct Charts {
     pub gluings: Vec<Gluing>,
 }
 
+impl Charts {
+    /// Turns every chart so that its first sector lies as in the central one. Where gluings are quarter turns, so are all transitions then.
+    pub fn turn_like_central(&mut self) {
+        let mut rotation: Vec<Option<f64>> = vec![None; self.charts.len()];
+        for t in &mut self.transitions {
+            let first = *rotation[t.to.index()].get_or_insert(t.motion.rotation);
+            let back = RigidMotion {
+                rotation: -first,
+                translation: [0.0; 2],
+            };
+            t.motion = back.after(&t.motion);
+        }
+        for (chart, rotation) in self.charts.iter_mut().zip(rotation) {
+            let turn = crate::atlas::plane::rotation(-rotation.unwrap_or(0.0));
+            let corners = chart.faces.iter_mut().flat_map(|f| &mut f.uv);
+            corners.for_each(|p| *p = turn(*p));
+        }
+    }
+}
+
 /// Why the charts could not be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ChartError {

@@ -157,7 +157,10 @@ fn build_component(
         unfolded.turn(-axis);
         central.turn(-axis);
     }
-    let charts = charts::chart(c, &cut, &central, &layout, &unfolded, &prescription)?;
+    let mut charts = charts::chart(c, &cut, &central, &layout, &unfolded, &prescription)?;
+    if metric.quarter_turns.is_some() {
+        charts.turn_like_central();
+    }
     let surface = Charted {
         mesh,
         metric,
