@@ -1,8 +1,8 @@
-//! How well geometry images hold a surface, at equal total texels: ours in both domains, beside the same sampler on the atlases of other programs.
+//! How well geometry images hold a surface, at equal total texels: ours in all domains, beside the same sampler on the atlases of other programs.
 //!
-//! `cargo bench --bench images -- [--peers DIR] [--flat | --rect] MESH…`: 128², 256² and 512² texels in all images together, their margins included. DIR holds
+//! `cargo bench --bench images -- [--peers DIR] [--flat | --rect | --grid] MESH…`: 128², 256² and 512² texels in all images together, their margins included. DIR holds
 //! `NAME.TOOL.obj`, the mesh with the texture coordinates of a tool, as `benches/peers/atlases.py` writes them. PSNR is
-//! 20 log10(diagonal / symmetric RMS distance) of the mesh that is rebuilt from images and seam samples. `--flat` leaves rectangles out, `--rect` flat images. Flat images are those of
+//! 20 log10(diagonal / symmetric RMS distance) of the mesh that is rebuilt from images and seam samples. `--flat`, `--rect` and `--grid` leave the other domains out. Flat images are those of
 //! `preset = "geometry-image-256"`, but without padding, as are charts of other programs. Nothing here is timed.
 
 mod common;
@@ -28,19 +28,23 @@ const SAMPLING: Sampling = Sampling {
 /// For small budgets: below this a patch asks for more texels than the rest allows.
 const MIN_SIDE: usize = 8;
 
+/// Cells of a grid along a side of a square of all of them.
+const CELLS_ON_SIDE: usize = 32;
+
 /// Budgets that are tried until one is kept.
 const ROUNDS: usize = 8;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut peers: Option<PathBuf> = None;
     let mut meshes: Vec<PathBuf> = Vec::new();
-    let mut domains = vec![Domain::Flat, Domain::Rectangle];
+    let mut domains = vec![Domain::Flat, Domain::Rectangle, Domain::Grid];
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--peers" => peers = Some(arguments.next().ok_or("--peers needs a folder")?.into()),
             "--flat" => domains = vec![Domain::Flat],
             "--rect" => domains = vec![Domain::Rectangle],
+            "--grid" => domains = vec![Domain::Grid],
             // What cargo adds.
             "--bench" => {}
             _ => meshes.push(argument.into()),
@@ -55,6 +59,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let label = match domain {
                 Domain::Flat => "ours, flat",
                 Domain::Rectangle => "ours, rectangle",
+                Domain::Grid => "ours, grid",
             };
             row(&name, label, |side| ours(&asset.soup, domain, side));
         }
@@ -95,6 +100,7 @@ fn settings(domain: Domain) -> Result<Config, Box<dyn Error>> {
     let mut config = match domain {
         Domain::Flat => config::parse("settings", "preset = \"geometry-image-256\"", &[])?,
         Domain::Rectangle => Config::default(),
+        Domain::Grid => config::parse("settings", "images.domain = \"grid\"", &[])?,
     };
     config.images.domain = domain;
     // What is rebuilt needs no texels beside a patch.
@@ -106,7 +112,22 @@ fn ours(soup: &Soup, domain: Domain, side: usize) -> Result<Found, Box<dyn Error
     let mut config = settings(domain)?;
     config.patches.texel_budget = side * side;
     config.patches.min_side = MIN_SIDE;
-    let atlas = job::build(soup, &config, &())?.swap_remove(0)?;
+    // About a thousand cells: as many as fit with their texels on both sides of borders.
+    config.grid.samples_per_cell = side / CELLS_ON_SIDE;
+    let mut cells = (CELLS_ON_SIDE * CELLS_ON_SIDE) as f64;
+    let mut atlas = None;
+    for _ in 0..ROUNDS {
+        config.grid.cells = cells as usize;
+        let built = job::build(soup, &config, &())?.swap_remove(0)?;
+        let texels: usize = built.images.iter().map(|i| i.width * i.height).sum();
+        let is_within = texels <= side * side || domain != Domain::Grid;
+        atlas = Some(built);
+        if is_within {
+            break;
+        }
+        cells *= 0.98 * (side * side) as f64 / texels as f64;
+    }
+    let atlas = atlas.ok_or("no atlas")?;
     let images = Images::new(&atlas.patches, &atlas.images, atlas.image_origin);
     measure(&component_of(soup)?, &atlas.patches, &images)
 }

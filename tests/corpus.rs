@@ -75,7 +75,12 @@ fn main() {
         }
         let run = move |corpus: &Path| seamless(&corpus.join(file), genus, loops);
         add(format!("seamless/{file}"), is_large, Box::new(run));
-        let run = move |corpus: &Path| Ok(grids(&corpus.join(file))?);
+        let run = move |corpus: &Path| {
+            let model = corpus.join(file);
+            Ok(grids(&model, |settings| {
+                build_one(&model, settings).map_err(failed)
+            })?)
+        };
         add(format!("grid/{file}"), is_large, Box::new(run));
     }
     for genus in [5, 24, 47, 100] {
@@ -171,6 +176,10 @@ fn verify(atlas: &Path, source: Option<&Path>, cones: Option<usize>) -> Result<(
     // A build has asked itself; the command is asked all the same.
     succeed("verify", program().arg("verify").arg(atlas))?;
     Ok(checked(atlas, source, cones)?)
+}
+
+fn failed(error: Failed) -> String {
+    error.message().unwrap_or("failed").to_owned()
 }
 
 fn max_error(json: &serde_json::Value) -> f64 {

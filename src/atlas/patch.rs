@@ -55,7 +55,9 @@ impl Domain {
     pub fn to_centres(self, texel_to_patch: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
         match self {
             Self::Flat => texel_to_patch,
-            Self::Rectangle | Self::Grid => texel_to_patch.map(|[a, b, c]| [a, b, c - 0.5 * (a + b)]),
+            Self::Rectangle | Self::Grid => {
+                texel_to_patch.map(|[a, b, c]| [a, b, c - 0.5 * (a + b)])
+            }
         }
     }
 }

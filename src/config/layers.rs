@@ -36,15 +36,6 @@ impl Layers {
         }
         merge(&mut own, self.set.clone());
         let mut merged = preset_layer(&own)?;
-        let is_grid = |table: &toml::Table| {
-            let domain = table.get("images").and_then(|images| images.get("domain"));
-            domain.map(|domain| domain.as_str() == Some("grid"))
-        };
-        if is_grid(&own).or_else(|| is_grid(&merged)) == Some(true) {
-            let mut implied = parse_layer(&Source::new("grid", GRID))?.0;
-            merge(&mut implied, merged);
-            merged = implied;
-        }
         merge(&mut merged, own);
         // Each layer was accepted alone and a key is replaced as a whole, so this can only fail where
         // a stage relates several of its keys.
@@ -60,29 +51,30 @@ impl Layers {
                 };
                 Err(ConfigError::OnlyFlat { key, domain, does })
             }
-            _ => without_grid(config),
+            _ => for_grid(config),
         }
     }
 }
 
-/// What the grid needs: it lies below everything that is written.
-const GRID: &str = "[cones]\nstrategy = \"field\"\n[flow]\nholonomy = \"quarter-turns\"\n";
-
-/// Refuses settings with which there is no grid, where one is asked for.
-fn without_grid(config: Config) -> Result<Config, ConfigError> {
+/// With what a grid needs, where one is asked for: in place of defaults, whether these are written or not. Anything else that is set and gives no grid is refused.
+fn for_grid(mut config: Config) -> Result<Config, ConfigError> {
     if config.images.domain != Domain::Grid {
         return Ok(config);
     }
-    let key = match (config.cones.strategy, config.flow.holonomy) {
-        (ConeStrategy::Field, Holonomy::QuarterTurns) => return Ok(config),
-        (ConeStrategy::Field, _) => "flow.holonomy",
-        _ => "cones.strategy",
-    };
-    let wanted = match key {
-        "flow.holonomy" => "quarter-turns",
-        _ => "field",
-    };
-    Err(ConfigError::NoGrid { key, wanted })
+    let default = Config::default();
+    if config.cones.strategy == default.cones.strategy {
+        config.cones.strategy = ConeStrategy::Field;
+    }
+    if config.flow.holonomy == default.flow.holonomy {
+        config.flow.holonomy = Holonomy::QuarterTurns;
+    }
+    match config.cones.strategy {
+        ConeStrategy::Field => Ok(config),
+        _ => Err(ConfigError::NoGrid {
+            key: "cones.strategy",
+            wanted: "field",
+        }),
+    }
 }
 
 /// A key that is given and means nothing but for flat images, and what it does with them.

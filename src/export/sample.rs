@@ -3,11 +3,11 @@
 //! A grid of `n` by `m` unit squares, each cut along its rising diagonal, is closed around
 //! (cylinder) or in both directions (torus). The central chart is the rectangle [0, n] × [0, m].
 
-use crate::atlas::patch::Domain;
 use crate::atlas::charts::{Chart, ChartFace, ChartKind, Charts, Gluing, Transition};
 use crate::atlas::cut::{CutGraph, Segment};
 use crate::atlas::develop::Development;
 use crate::atlas::geometry_image::{GeometryImage, ImageParams};
+use crate::atlas::patch::Domain;
 use crate::atlas::patches::{Patch, PatchLayout, Seam, SeamSample};
 use crate::atlas::plane::{RigidMotion, Similarity, distance};
 use crate::export::Provenance;

@@ -141,9 +141,7 @@ mod tests {
             faces.extend([[a, b, c], [a, c, d]]);
         }
         let count = (n + 1) * (n + 1);
-        let place = |v: u32| {
-            [v / (n + 1), v % (n + 1), 0].map(|x| f64::from(x) / f64::from(n))
-        };
+        let place = |v: u32| [v / (n + 1), v % (n + 1), 0].map(|x| f64::from(x) / f64::from(n));
         Mesh {
             connectivity: Connectivity::from_faces(&faces, count as usize).unwrap(),
             positions: (0..count).map(place).collect(),

@@ -5,7 +5,7 @@
 
 use super::blocks::Blocks;
 use super::error::GridError;
-use super::map::{Anchor, Freedom, GridMap, double_area};
+use super::map::{Anchor, Freedom, GridMap, is_turned_over};
 use super::quads::QuadMesh;
 use super::sheet::Aim;
 use super::slivers::thicken;
@@ -263,7 +263,7 @@ fn settle(map: &mut GridMap, placed: &[Option<Placed>]) -> Result<(), GridError>
     round(map);
     let over: Vec<FaceId> = c
         .faces()
-        .filter(|&f| !(double_area(map.corners(f)) > 0.0))
+        .filter(|&f| is_turned_over(map.corners(f)))
         .collect();
     match over[..] {
         [] => Ok(()),

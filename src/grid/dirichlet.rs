@@ -8,7 +8,7 @@
 
 use super::complex::turned;
 use super::error::GridError;
-use super::map::{Freedom, GridMap, double_area};
+use super::map::{Freedom, GridMap, double_area, is_turned_over};
 use crate::flow::solve::SymmetricSolver;
 use crate::geometry::ids::{FaceId, HalfedgeVec, VertexVec};
 use rayon::prelude::*;
@@ -93,9 +93,7 @@ impl Rest {
     fn jacobian(&self, [p, q, r]: [[f64; 2]; 3]) -> [[f64; 2]; 2] {
         let d = [[q[0] - p[0], r[0] - p[0]], [q[1] - p[1], r[1] - p[1]]];
         let b = self.inverse;
-        std::array::from_fn(|i| {
-            std::array::from_fn(|j| d[i][0] * b[0][j] + d[i][1] * b[1][j])
-        })
+        std::array::from_fn(|i| std::array::from_fn(|j| d[i][0] * b[0][j] + d[i][1] * b[1][j]))
     }
 
     fn energy(&self, corners: [[f64; 2]; 3]) -> f64 {
@@ -257,7 +255,7 @@ pub(crate) fn relax(map: &mut GridMap, unit: f64) -> Result<Relaxed, GridError> 
     let first = problem.energy(&place);
     if !first.is_finite() {
         let flat = |f: &FaceId| problem.corners(f.index(), &place);
-        let over: Vec<FaceId> = c.faces().filter(|f| !(double_area(flat(f)) > 0.0)).collect();
+        let over: Vec<FaceId> = c.faces().filter(|f| is_turned_over(flat(f))).collect();
         let face = over.first().copied().unwrap_or(FaceId::new(0));
         let count = over.len();
         return Err(GridError::TurnedOver { count, face });
@@ -368,7 +366,11 @@ impl Problem<'_> {
             let index = |k: usize, a: usize| 2 * corner[k].0 as usize + a;
             let value = |i: [usize; 2], j: [usize; 2]| {
                 let both = is_free[index(i[0], i[1])] && is_free[index(j[0], j[1])];
-                if both { h[2 * i[0] + i[1]][2 * j[0] + j[1]] } else { 0.0 }
+                if both {
+                    h[2 * i[0] + i[1]][2 * j[0] + j[1]]
+                } else {
+                    0.0
+                }
             };
             for k in 0..3 {
                 for a in 0..2 {
@@ -438,7 +440,7 @@ mod tests {
 
     #[test]
     fn derivatives_are_those_of_the_energy() {
-        let rest = Rest::new(FACE, 0.8, CORNERS);
+        let rest = Rest::new(FACE, 1.6, CORNERS);
         let (gradient, hessian) = rest.derivatives(CORNERS);
         let h = 1e-5;
         for i in 0..6 {
@@ -458,7 +460,8 @@ mod tests {
         let rest = Rest::new(FACE, 0.8, CORNERS);
         let turns = [1u8, 2, 3];
         let own: [[f64; 2]; 3] = std::array::from_fn(|k| turned(CORNERS[k], 4 - turns[k]));
-        let energy = |own: [[f64; 2]; 3]| rest.energy(std::array::from_fn(|k| turned(own[k], turns[k])));
+        let energy =
+            |own: [[f64; 2]; 3]| rest.energy(std::array::from_fn(|k| turned(own[k], turns[k])));
         let (g, h) = rest.derivatives(CORNERS);
         let (gradient, _) = turned_back(&g, &h, turns);
         for (i, g) in gradient.into_iter().enumerate() {
@@ -471,9 +474,11 @@ mod tests {
     fn roots_are_where_the_area_ends() {
         let d = [[0.0, 0.1], [-0.5, 0.3], [0.4, -0.6]];
         let t = first_root(CORNERS, d);
-        let at = |t: f64| double_area(std::array::from_fn(|k| {
-            [CORNERS[k][0] + t * d[k][0], CORNERS[k][1] + t * d[k][1]]
-        }));
+        let at = |t: f64| {
+            double_area(std::array::from_fn(|k| {
+                [CORNERS[k][0] + t * d[k][0], CORNERS[k][1] + t * d[k][1]]
+            }))
+        };
         assert!(t.is_finite() && at(t).abs() < 1e-12 && at(0.5 * t) > 0.0);
         assert_eq!(first_root(CORNERS, [[1.0, 2.0]; 3]), f64::INFINITY);
     }

@@ -50,10 +50,7 @@ pub(super) fn measure(
 }
 
 fn dirichlet(map: &GridMap, cell_size: f64) -> MeanMax {
-    let (c, position) = (
-        &map.sheet.fine.connectivity,
-        &map.sheet.fine.position,
-    );
+    let (c, position) = (&map.sheet.fine.connectivity, &map.sheet.fine.position);
     let (mut sum, mut whole, mut max) = (0.0, 0.0, 4.0f64);
     for f in c.faces() {
         let p = c.face_vertices(f).map(|v| position[v]);

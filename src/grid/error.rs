@@ -96,7 +96,9 @@ pub enum GridError {
         face: FaceId,
     },
     /// A face is turned over by the map.
-    #[error("{count} faces of the surface are turned over on the grid, face {face} of its refinement first")]
+    #[error(
+        "{count} faces of the surface are turned over on the grid, face {face} of its refinement first"
+    )]
     TurnedOver {
         /// How many.
         count: usize,

@@ -48,6 +48,20 @@ impl Lattice {
         }
     }
 
+    /// With cells half as long.
+    pub fn halved(mut self) -> Self {
+        let sides: Vec<HalfedgeId> = self.complex.sides().collect();
+        for h in sides {
+            let side = self.complex.side(h);
+            if side.twin.is_none_or(|t| h < t) {
+                let steps = side.steps.map(|x| 2 * x);
+                self.complex.set_steps(h, steps);
+            }
+        }
+        self.scale *= 2.0;
+        self
+    }
+
     /// Where a side is to go, cells.
     pub fn wanted(&self, h: HalfedgeId) -> [f64; 2] {
         self.complex.side(h).vector.map(|x| self.scale * x)

@@ -107,7 +107,8 @@ impl GridMap {
 
     /// Where a vertex is, seen from its first corner.
     pub fn place(&self, v: VertexId) -> [f64; 2] {
-        self.sheet.at(self.sheet.fine.connectivity.vertex_halfedge(v))
+        self.sheet
+            .at(self.sheet.fine.connectivity.vertex_halfedge(v))
     }
 
     /// Coordinates of the corners of a face.
@@ -119,7 +120,10 @@ impl GridMap {
     /// The bearing of an anchor as it is now.
     pub fn bearing(&self, anchor: &Anchor) -> f64 {
         let c = &self.sheet.fine.connectivity;
-        let (old, now) = (anchor.first, self.sheet.vector(c.vertex_halfedge(anchor.vertex)));
+        let (old, now) = (
+            anchor.first,
+            self.sheet.vector(c.vertex_halfedge(anchor.vertex)),
+        );
         let turn = super::complex::cross(old, now).atan2(old[0] * now[0] + old[1] * now[1]);
         anchor.bearing - turn
     }
@@ -128,6 +132,12 @@ impl GridMap {
 /// Twice the area of a triangle.
 pub(crate) fn double_area([p, q, r]: [[f64; 2]; 3]) -> f64 {
     (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+}
+
+/// Whether a triangle has no area, or a negative one.
+pub(crate) fn is_turned_over(corners: [[f64; 2]; 3]) -> bool {
+    let area = double_area(corners);
+    area <= 0.0 || area.is_nan()
 }
 
 /// Where a face lies: in which triangle between cones, and how its frame turns and moves into that of the triangle.
@@ -163,7 +173,11 @@ pub(crate) fn affine(
         let p = [x + u.shift[0], y + u.shift[1]];
         let ([a, b, c], to) = (real[u.face], lattice.corners(u.face));
         let whole = double_area([a, b, c]);
-        let w = [double_area([p, b, c]), double_area([a, p, c]), double_area([a, b, p])];
+        let w = [
+            double_area([p, b, c]),
+            double_area([a, p, c]),
+            double_area([a, b, p]),
+        ];
         std::array::from_fn(|i| (0..3).map(|k| w[k] / whole * to[k][i] as f64).sum())
     };
     let c = &sheet.fine.connectivity;
@@ -175,9 +189,17 @@ pub(crate) fn affine(
         if line == NONE {
             continue;
         }
-        [h, c.next(h)].iter().for_each(|&h| on_side[c.tail(h)] = line);
+        [h, c.next(h)]
+            .iter()
+            .for_each(|&h| on_side[c.tail(h)] = line);
         // The side that runs the way of this halfedge, in the triangle on its left.
-        let side = side_of(lattice, under[c.face(h)].face, line, sheet.vector(h), under[c.face(h)].turns);
+        let side = side_of(
+            lattice,
+            under[c.face(h)].face,
+            line,
+            sheet.vector(h),
+            under[c.face(h)].turns,
+        );
         let face = c.face(h);
         let side = side.ok_or(GridError::NoTriangle { face })?;
         let (own, turns) = (complex.side(side), complex.side(side).turns);
@@ -207,7 +229,9 @@ pub(crate) fn affine(
             let sides = (0..3).map(|k| HalfedgeId::new(3 * u.face.index() + k));
             let own = sides
                 .filter(|&s| s == side || complex.side(s).twin == Some(side))
-                .min_by(|&s, &t| distance(lattice, s, place).total_cmp(&distance(lattice, t, place)));
+                .min_by(|&s, &t| {
+                    distance(lattice, s, place).total_cmp(&distance(lattice, t, place))
+                });
             if let Some(own) = own {
                 place = nearest(lattice, own, place);
                 if let Some(d) = lattice.direction(own) {
@@ -220,7 +244,13 @@ pub(crate) fn affine(
     let mut paths = Vec::new();
     for (v, first) in vertex.iter().zip(mesh.first_edges(lattice)) {
         let (side, direction, edge) = first;
-        paths.push((*v, start(&sheet, lattice, vertex, side)?.corner, side, direction, edge));
+        paths.push((
+            *v,
+            start(&sheet, lattice, vertex, side)?.corner,
+            side,
+            direction,
+            edge,
+        ));
     }
     sheet.turns = grid_turns;
     let vertices = sheet.fine.connectivity.vertices();
@@ -301,7 +331,9 @@ fn flood(
             let [a, b] = turned(to, *turns);
             (a - side.vector[0]).hypot(b - side.vector[1])
         };
-        let turns = (0..4u8).min_by(|a, b| fits(a).total_cmp(&fits(b))).unwrap_or(0);
+        let turns = (0..4u8)
+            .min_by(|a, b| fits(a).total_cmp(&fits(b)))
+            .unwrap_or(0);
         let [x, y] = turned(at, turns);
         let corner = real[f][0];
         let shift = [corner[0] - x, corner[1] - y];
@@ -376,10 +408,12 @@ fn side_of(
         let [a, b] = complex.side(h).vector;
         (a * x + b * y) / (a.hypot(b) * x.hypot(y))
     };
-    let own = (0..3).map(|k| HalfedgeId::new(3 * f.index() + k)).filter(|&h| {
-        let twin = complex.side(h).twin;
-        h.raw() == line || twin.is_some_and(|t| t.raw() == line)
-    });
+    let own = (0..3)
+        .map(|k| HalfedgeId::new(3 * f.index() + k))
+        .filter(|&h| {
+            let twin = complex.side(h).twin;
+            h.raw() == line || twin.is_some_and(|t| t.raw() == line)
+        });
     own.filter(|&h| along(h) > 0.0)
         .max_by(|&a, &b| along(a).total_cmp(&along(b)))
 }

@@ -32,7 +32,7 @@ use crate::atlas::geometry_image::GeometryImage;
 use crate::atlas::patches::{PatchLayout, PatchParams};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceVec, HalfedgeId, HalfedgeVec, VertexId};
-use crate::geometry::mesh::triangle_area;
+use crate::geometry::mesh::{Mesh, triangle_area};
 use crate::geometry::subdivision::Subdivision;
 use blocks::Blocks;
 use map::GridMap;
@@ -84,7 +84,8 @@ pub fn grid(
     params: &GridParams,
     patches: &PatchParams,
 ) -> Result<(Charted, PatchLayout, Grid), Box<(Charted, GridError)>> {
-    match made(&surface, params) {
+    let lines = lines(&surface, params.cells);
+    match made(&surface.mesh, &surface.central.uv, &lines, params) {
         Ok((map, grid, located)) => {
             let surface = charted::lift(surface, &map.sheet.fine);
             let layout = patches::layout(&surface, &grid, located, patches);
@@ -94,17 +95,35 @@ pub fn grid(
     }
 }
 
+/// The same of a surface that lies on the plane face by face: source units, each face in a frame of its own.
 fn made(
-    surface: &Charted,
+    mesh: &Mesh,
+    central: &FaceVec<[[f64; 2]; 3]>,
+    lines: &EdgeVec<bool>,
     params: &GridParams,
 ) -> Result<(GridMap, Grid, layout::Located), GridError> {
-    let (mesh, central) = (&surface.mesh, &surface.central.uv);
     let c = &mesh.connectivity;
-    let flat = cone_triangulation::complex(c, central, &lines(surface))?;
+    let flat = cone_triangulation::complex(c, central, lines)?;
     let turns: HalfedgeVec<u8> = c.halfedges().map(|h| flat.side(h).turns).collect();
     let cones = cone_triangulation::reduce(flat, c.vertex_count())?;
-    let lattice = quantise::quantise(&cones.complex, cones.vertex.len(), params.cells as f64)?;
-    let quads = lattice.quads()?;
+    let wanted = params.cells as f64;
+    let mut lattice = quantise::quantise(&cones.complex, cones.vertex.len(), wanted)?;
+    let mut quads = lattice.quads()?;
+    for halvings in 1..=MOST_HALVINGS {
+        if quads.is_simple() {
+            break;
+        }
+        // Fewer cells that are divided into as many as wanted.
+        let coarse = (wanted / 4f64.powi(halvings)).max(1.0);
+        lattice = quantise::quantise(&cones.complex, cones.vertex.len(), coarse)?;
+        for _ in 0..halvings {
+            lattice = lattice.halved();
+        }
+        quads = lattice.quads()?;
+    }
+    if !quads.is_simple() {
+        return Err(GridError::NoCells);
+    }
     let blocks = quads.blocks()?;
     let mut fine = Subdivision::identity(mesh);
     for h in c.halfedges() {
@@ -148,17 +167,35 @@ fn made(
         shift: k.faces().map(|f| of_edges(f, &|h| map.shift(h))).collect(),
         distortion: distortion::measure(&map, &quads, &located.points, cell_size),
         points: located.points.clone(),
-        vertex: placed.iter().map(|p| p.as_ref().map(|p| p.vertex)).collect(),
+        vertex: placed
+            .iter()
+            .map(|p| p.as_ref().map(|p| p.vertex))
+            .collect(),
         quads,
         blocks,
     };
     Ok((map, grid, located))
 }
 
-/// Edges on lines of the metric: features; borders are lines anyway.
-fn lines(surface: &Charted) -> EdgeVec<bool> {
+/// How often cells are halved where two edges of the quad mesh have the same ends: a single cell whose sides are glued needs it twice.
+const MOST_HALVINGS: i32 = 2;
+
+/// Features that are shorter, in cells, are no lines of the lattice: they would need more cells around them than the surface.
+const SHORTEST_LINE: f64 = 2.0;
+
+/// Edges on lines of the lattice: features of some length; borders are lines anyway.
+fn lines(surface: &Charted, cells: usize) -> EdgeVec<bool> {
     let c: &Connectivity = &surface.mesh.connectivity;
-    let lines = surface.metric.quarter_turns.iter().flat_map(|met| &met.lines);
+    let areas = c
+        .faces()
+        .map(|f| triangle_area(surface.mesh.face_positions(f)));
+    let shortest = SHORTEST_LINE * (areas.sum::<f64>() / cells as f64).sqrt();
+    let lines = surface
+        .metric
+        .quarter_turns
+        .iter()
+        .flat_map(|met| &met.lines)
+        .filter(|line| line.length >= shortest);
     let pairs = lines.flat_map(|line| line.vertices.windows(2));
     let sorted = |a: VertexId, b: VertexId| [a.min(b), a.max(b)];
     let pairs: BTreeSet<[VertexId; 2]> = pairs.map(|w| sorted(w[0], w[1])).collect();
@@ -209,17 +246,22 @@ impl Grid {
 
     /// Makes texels on common sides of images the same to the last bit.
     pub fn unite(&self, images: &mut [GeometryImage]) {
-        layout::shared_texels(&self.quads, &self.blocks, self.samples_per_cell, |from, to| {
-            let at = |[b, column, row]: [usize; 3]| (b, images[b].width * row + column);
-            let ((b, i), (d, j)) = (at(from), at(to));
-            let (position, normal, log_scale) = (
-                images[b].position[i],
-                images[b].normal[i],
-                images[b].log_scale[i],
-            );
-            images[d].position[j] = position;
-            images[d].normal[j] = normal;
-            images[d].log_scale[j] = log_scale;
-        });
+        layout::shared_texels(
+            &self.quads,
+            &self.blocks,
+            self.samples_per_cell,
+            |from, to| {
+                let at = |[b, column, row]: [usize; 3]| (b, images[b].width * row + column);
+                let ((b, i), (d, j)) = (at(from), at(to));
+                let (position, normal, log_scale) = (
+                    images[b].position[i],
+                    images[b].normal[i],
+                    images[b].log_scale[i],
+                );
+                images[d].position[j] = position;
+                images[d].normal[j] = normal;
+                images[d].log_scale[j] = log_scale;
+            },
+        );
     }
 }

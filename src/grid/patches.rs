@@ -39,12 +39,7 @@ pub(super) fn layout(
     let patches = patches.collect();
     let face_patch = located.block.iter().map(|&b| PatchId::new(b as usize));
     let face_patch: FaceVec<PatchId> = face_patch.collect();
-    let seams = seams(
-        &surface.mesh,
-        &surface.cut.is_cut,
-        &face_patch,
-        &located.uv,
-    );
+    let seams = seams(&surface.mesh, &surface.cut.is_cut, &face_patch, &located.uv);
     PatchLayout {
         face_patch,
         uv: located.uv,

@@ -42,6 +42,22 @@ pub struct QuadMesh {
 }
 
 impl QuadMesh {
+    /// Whether no two edges have the same ends, and none has the same point at both.
+    pub fn is_simple(&self) -> bool {
+        let mut ends: Vec<[u32; 2]> = Vec::with_capacity(2 * self.quads.len());
+        for (q, (corners, across)) in self.quads.iter().zip(&self.across).enumerate() {
+            for k in 0..4 {
+                // Of both sides of an edge the first.
+                if across[k].is_none_or(|other| (q as u32, k as u8) < other) {
+                    let [a, b] = [corners[k], corners[(k + 1) % 4]];
+                    ends.push([a.min(b), a.max(b)]);
+                }
+            }
+        }
+        ends.sort_unstable();
+        ends.iter().all(|[a, b]| a != b) && ends.windows(2).all(|w| w[0] != w[1])
+    }
+
     /// Whether points are on the border.
     pub fn border(&self) -> Vec<bool> {
         let mut is_border = vec![false; self.points.len()];
@@ -59,7 +75,10 @@ impl QuadMesh {
         let vertices = self.points.iter().zip(&self.first);
         let vertices = vertices.filter(|(p, _)| p.vertex.is_some());
         let first = vertices.map(|(_, (dart, edge))| {
-            let corner = lattice.corners(dart.face).iter().position(|at| *at == dart.at);
+            let corner = lattice
+                .corners(dart.face)
+                .iter()
+                .position(|at| *at == dart.at);
             (side(dart.face, corner.unwrap_or(0)), dart.direction, *edge)
         });
         first.collect()

@@ -214,7 +214,12 @@ impl Sheet {
     }
 
     /// Draws a straight line to where `aims` say, seen from some corners of one vertex. The vertex where it ends: `goal`, if there is one already.
-    pub fn draw(&mut self, aims: Vec<Aim>, line: u32, goal: Option<VertexId>) -> Result<VertexId, GridError> {
+    pub fn draw(
+        &mut self,
+        aims: Vec<Aim>,
+        line: u32,
+        goal: Option<VertexId>,
+    ) -> Result<VertexId, GridError> {
         let mut aims = aims;
         let lost = |aims: &[Aim], sheet: &Sheet| GridError::Lost {
             line,
@@ -264,12 +269,14 @@ impl Sheet {
                 }
                 Way::Into => {
                     let opposite = c.next(aim.corner);
-                    let [p, a, b] =
-                        [aim.corner, opposite, c.next(opposite)].map(|h| self.at(h));
+                    let [p, a, b] = [aim.corner, opposite, c.next(opposite)].map(|h| self.at(h));
                     let d = minus(aim.target, p);
                     let (right, left) = (cross(minus(a, p), d), cross(d, minus(b, p)));
                     let part = right / (right + left);
-                    let across = minus([a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])], p);
+                    let across = minus(
+                        [a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])],
+                        p,
+                    );
                     let reach = length(d) / length(across);
                     if goal.is_none() && reach < 1.0 - self.near {
                         let weights = [1.0 - reach, reach * (1.0 - part), reach * part];
@@ -310,15 +317,17 @@ impl Sheet {
         let mut turns: Vec<u8> = vec![0];
         for i in 1..corners.len() {
             let left = c.twin(c.prev(corners[i - 1])) == Some(corners[i]);
-            turns.push(match left {
-                true => turns[i - 1] + self.turns[c.prev(corners[i - 1])],
-                false => {
-                    // From the corner on its left.
-                    let h = c.twin(c.prev(corners[i]));
-                    let at = corners[..i].iter().position(|&k| Some(k) == h).unwrap_or(0);
-                    turns[at] + 4 - self.turns[c.prev(corners[i])]
-                }
-            } & 3);
+            turns.push(
+                match left {
+                    true => turns[i - 1] + self.turns[c.prev(corners[i - 1])],
+                    false => {
+                        // From the corner on its left.
+                        let h = c.twin(c.prev(corners[i]));
+                        let at = corners[..i].iter().position(|&k| Some(k) == h).unwrap_or(0);
+                        turns[at] + 4 - self.turns[c.prev(corners[i])]
+                    }
+                } & 3,
+            );
         }
         for (h, turns) in corners.into_iter().zip(turns) {
             let [x, y] = turned(by, turns);

@@ -3,7 +3,7 @@
 //! *Enters:* a [`GridMap`] that is one to one but for a few thin faces, whose vertices rounding has put on the wrong side. *Leaves:* the same with these vertices moved, so that every face is as thick as
 //! [`THICK`] if it can be. The surface stays: only the map to the grid changes, by less than thin faces are long. *Not guaranteed:* that it succeeds.
 
-use super::map::{Freedom, GridMap, double_area};
+use super::map::{Freedom, GridMap, double_area, is_turned_over};
 use crate::geometry::ids::{FaceId, VertexId};
 use std::collections::BTreeSet;
 
@@ -63,7 +63,7 @@ pub(crate) fn thicken(map: &mut GridMap) -> usize {
         }
     }
     let c = &map.sheet.fine.connectivity;
-    let over = |f: &FaceId| !(double_area(map.corners(*f)) > 0.0);
+    let over = |f: &FaceId| is_turned_over(map.corners(*f));
     c.faces().filter(over).count()
 }
 
@@ -85,7 +85,10 @@ fn move_away(map: &mut GridMap, v: VertexId) -> bool {
         let of_face = star.iter().map(|&[q, r]| thickness([p, q, r]));
         of_face.fold(f64::INFINITY, f64::min)
     };
-    let size = star.iter().flatten().map(|q| (q[0] - first[0]).hypot(q[1] - first[1]));
+    let size = star
+        .iter()
+        .flatten()
+        .map(|q| (q[0] - first[0]).hypot(q[1] - first[1]));
     let size = size.fold(0.0, f64::max);
     let (mut best, mut place) = (least(first), None);
     if best >= THICK {

@@ -25,10 +25,10 @@ pub use precision::{Cause, Precision};
 use flatten::{Flattened, flatten, prescribed, refine_for};
 use publication::Publication;
 
+use crate::atlas::charted::Charted;
 use crate::atlas::develop::Development;
 use crate::atlas::geometry_image::SourceSurface;
 use crate::atlas::patches::Domain;
-use crate::atlas::charted::Charted;
 use crate::atlas::{axes, charts, develop, geometry_image, patches, rectangles};
 use crate::config::Config;
 use crate::export::folder::list_files;

@@ -122,10 +122,10 @@ fn every_key_of_the_manifest_is_described() {
     assert_same(&keys, &described, "the section manifest.jsonl");
 }
 
-/// Name, shape and type, with the counts of the fixture in place of V, F, C, N, S and M.
+/// Name, shape and type, with the counts of the fixture in place of V, F, C, N, S, M, K and P.
 #[test]
 fn every_array_of_atlas_npz_is_described() {
-    let built = cube(&[]);
+    let built = cube(&["images.domain=\"grid\""]);
     let found = shapes(&built.atlas());
     let size = |name: &str| found[name].1[0];
     let counts = BTreeMap::from([
@@ -137,6 +137,8 @@ fn every_array_of_atlas_npz_is_described() {
         ("S", size("seam_patch")),
         ("S+1", size("seam_offset")),
         ("M", size("seam_position")),
+        ("K", size("quads")),
+        ("P", size("quad_positions")),
     ]);
     let charts = document(&built.atlas())["charts"].as_array().map(Vec::len);
     assert_eq!(charts, Some(counts["C"] as usize));
@@ -306,6 +308,7 @@ fn shapes(atlas: &Path) -> BTreeMap<String, (&'static str, Vec<u64>)> {
             "<f8" => "float64",
             "<u4" => "uint32",
             "|u1" => "uint8",
+            "<i8" => "int64",
             other => panic!("{file_name}: {other}"),
         };
         let name = file_name.trim_end_matches(".npy").to_owned();

@@ -83,6 +83,22 @@ pub fn checked(atlas: &Path, source: Option<&Path>, cones: Option<usize>) -> Res
     succeed("checker", &mut command)
 }
 
+/// Asks another checker, a file beside the independent one.
+pub fn checked_by(name: &str, atlas: &Path, source: Option<&Path>) -> Result<(), String> {
+    let Some(checker) = std::env::var_os("AFFINE_ATLAS_CHECKER") else {
+        return Ok(());
+    };
+    let python = std::env::var_os("AFFINE_ATLAS_PYTHON").unwrap_or_else(|| "python3".into());
+    let mut command = Command::new(python);
+    command
+        .arg(Path::new(&checker).with_file_name(name))
+        .arg(atlas);
+    if let Some(source) = source {
+        command.arg("--source").arg(source);
+    }
+    succeed(name, &mut command)
+}
+
 /// Runs a program that lists what is wrong in lines that begin with FAIL.
 pub fn succeed(who: &str, command: &mut Command) -> Result<(), String> {
     let Output {

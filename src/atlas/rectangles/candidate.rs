@@ -10,17 +10,17 @@ use super::flow::Rectangle;
 use super::glue::Added;
 use super::quads::Quad;
 use super::sides::Drawing;
-use crate::atlas::charted::{self, Charted};
-use crate::geometry::subdivision::Subdivision;
 use super::{
-    RectangleError, clusters, contract, density, division, flow, glue, parity,
-    place, quadrangulate, quads, relax, sizes, walls,
+    RectangleError, clusters, contract, density, division, flow, glue, parity, place,
+    quadrangulate, quads, relax, sizes, walls,
 };
+use crate::atlas::charted::{self, Charted};
 use crate::atlas::geometry_image::{GeometryImage, sample};
 use crate::atlas::patches::{Domain, Patch, PatchLayout, PatchParams, packed, seams};
 use crate::atlas::texels::{Bend, FINER};
 use crate::geometry::ids::{EdgeVec, FaceVec, PatchId};
 use crate::geometry::mesh::{Mesh, cross, norm, sub};
+use crate::geometry::subdivision::Subdivision;
 use rayon::prelude::*;
 use std::sync::atomic::AtomicUsize;
 use std::sync::atomic::Ordering::Relaxed;

@@ -12,8 +12,8 @@
 
 use super::RectangleError;
 use super::disk::Disk;
-use crate::geometry::subdivision::Subdivision;
 use crate::geometry::ids::{EdgeId, EdgeVec, HalfedgeId, VertexId, VertexVec};
+use crate::geometry::subdivision::Subdivision;
 use crate::geometry::triangle::angles;
 use std::f64::consts::FRAC_PI_2;
 

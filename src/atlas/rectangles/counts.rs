@@ -8,8 +8,8 @@
 //! along and across every rectangle, and with that the numbers are those for which the sum of squared errors is least ([`Strips::bent`]).
 
 use super::quads::Quad;
-use crate::geometry::subdivision::Subdivision;
 use crate::atlas::texels::{Bend, Shares};
+use crate::geometry::subdivision::Subdivision;
 use rustc_hash::FxHashMap as Map;
 
 /// Least samples along a side: one more than a cubic needs.

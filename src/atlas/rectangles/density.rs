@@ -7,8 +7,8 @@
 //! and their grid lines allow.
 
 use super::flow::Rectangle;
-use crate::geometry::subdivision::Subdivision;
 use crate::geometry::ids::{FaceVec, VertexVec};
+use crate::geometry::subdivision::Subdivision;
 use crate::geometry::triangle::area;
 
 /// Density follows this power of the bend.

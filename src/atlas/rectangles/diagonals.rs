@@ -6,11 +6,11 @@
 //! Where the mirror of a doubled surface passes through a face, what is left of it is a cell of four or five corners. In the flat metric it is convex, and how it is triangulated does not
 //! matter; a map to a rectangle need not keep it convex, and faces across a corner that points inwards would be turned over.
 
-use crate::geometry::subdivision::Subdivision;
 use crate::atlas::overlay::{Carrier, Layout};
 use crate::atlas::patches::apex;
 use crate::atlas::plane::{distance, doubled_area};
 use crate::geometry::ids::{EdgeId, FaceId, FaceVec, HalfedgeId, HalfedgeVec, VertexId, VertexVec};
+use crate::geometry::subdivision::Subdivision;
 use std::collections::BTreeMap;
 
 /// Where a diagonal crosses an edge.

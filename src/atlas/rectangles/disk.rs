@@ -5,11 +5,11 @@
 
 use super::RectangleError;
 use super::harmonic::harmonic;
-use crate::geometry::subdivision::Subdivision;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{
     EdgeId, EdgeVec, FaceId, FaceVec, HalfedgeId, HalfedgeVec, NONE, VertexId, VertexVec,
 };
+use crate::geometry::subdivision::Subdivision;
 
 /// A disk; face `f` of it is the face `faces[f]` of the subdivision, with corners in the same order.
 pub(super) struct Disk {

@@ -9,12 +9,12 @@
 use super::RectangleError;
 use super::diagonals;
 use super::quads::Quad;
-use crate::geometry::subdivision::{Corner, Subdivision};
 use crate::atlas::overlay::{self, Carrier, Layout, OnBase, Overlay};
 use crate::flow::prescription::{BoundaryCondition, Prescription};
 use crate::flow::ricci::{self, FlowParams};
 use crate::geometry::ids::{EdgeId, FaceVec, HalfedgeId, HalfedgeVec, NONE, VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
+use crate::geometry::subdivision::{Corner, Subdivision};
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 

@@ -8,11 +8,11 @@
 
 use super::RectangleError;
 use super::flow::{Piece, Rectangle};
-use crate::geometry::subdivision::{Corner, Subdivision};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{
     EdgeId, EdgeVec, FaceId, HalfedgeId, HalfedgeVec, NONE, PatchId, VertexId, VertexVec,
 };
+use crate::geometry::subdivision::{Corner, Subdivision};
 
 /// Places that the two sides of a wall added this near to each other (in lengths of the edge) are one.
 const SAME: f64 = 1e-9;

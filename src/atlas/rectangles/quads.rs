@@ -17,8 +17,8 @@ use super::chord::{Crossing, aim, zero_level};
 use super::disk::Disk;
 use super::division::{cross, draw, joining, part, places, regions};
 use super::sides::{Drawing, Role};
-use crate::geometry::subdivision::Subdivision;
 use crate::geometry::ids::{EdgeId, FaceId, VertexId, VertexVec};
+use crate::geometry::subdivision::Subdivision;
 
 /// A four-sided part of a patch.
 pub(super) struct Quad {

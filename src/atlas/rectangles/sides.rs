@@ -7,10 +7,10 @@
 //! A side that two patches share is as long for one as for the other, so what is marked fits on both without negotiation.
 
 use super::RectangleError;
-use crate::geometry::subdivision::Subdivision;
 use crate::atlas::patches::edge_bends;
 use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, FaceVec, PatchId, VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
+use crate::geometry::subdivision::Subdivision;
 use crate::geometry::triangle::area;
 
 /// Least sides of a patch: its centre must not lie on a straight line between two middles.

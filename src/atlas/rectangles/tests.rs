@@ -9,7 +9,6 @@ use super::flow::Rectangle;
 use super::glue::Added;
 use super::quads::{Quad, quads, regions_as_quads};
 use super::sides::Drawing;
-use crate::geometry::subdivision::Subdivision;
 use super::walls::{self, Fractions};
 use super::{RectangleError, division, flow, place};
 use crate::atlas::cut::cut;
@@ -18,6 +17,7 @@ use crate::flow::prescription::{BoundaryCondition, Prescription};
 use crate::geometry::ids::{FaceVec, HalfedgeId, PatchId, VertexId, VertexVec};
 use crate::geometry::mesh::Mesh;
 use crate::geometry::polycube::{lengths, polycube};
+use crate::geometry::subdivision::Subdivision;
 use robust::{Coord, orient2d};
 use std::collections::BTreeMap;
 

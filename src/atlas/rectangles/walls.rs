@@ -9,9 +9,9 @@
 
 use super::RectangleError;
 use super::flow::{Piece, Rectangle, sides};
-use crate::geometry::subdivision::Subdivision;
 use crate::geometry::ids::{HalfedgeVec, NONE, VertexId};
 use crate::geometry::mesh::distance;
+use crate::geometry::subdivision::Subdivision;
 use std::ops::Range;
 
 /// Edges get at least about this part of their side: what conformal maps crowd into less is put beyond the reach of rounding,

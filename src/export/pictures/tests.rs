@@ -1,11 +1,11 @@
 //! Pictures of small atlases made by hand.
 
 use super::*;
-use crate::atlas::patch::Domain;
 use crate::atlas::charts::Charts;
 use crate::atlas::cut::{CutGraph, Segment};
 use crate::atlas::develop::Development;
 use crate::atlas::geometry_image::ImageParams;
+use crate::atlas::patch::Domain;
 use crate::atlas::patches::{Patch, PatchLayout};
 use crate::atlas::plane::{Similarity, distance};
 use crate::flow::cones::{BoundaryCondition, Cone, Prescription};
