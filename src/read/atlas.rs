@@ -56,7 +56,7 @@ pub enum FolderError {
     },
     /// A domain that is not known.
     #[error(
-        "patch {patch} of {} has the domain {domain:?}; it must be \"flat\" or \"rectangle\"",
+        "patch {patch} of {} has the domain {domain:?}; it must be \"flat\", \"rectangle\" or \"grid\"",
         path.display()
     )]
     Domain {
