@@ -246,7 +246,7 @@ impl Complex {
         wide(tn, minus(hp)) && wide(hn, minus(tp))
     }
 
-    /// Whether both triangles after a flip have areas of at least [`THICK`] of the square of their longest side.
+    /// Whether both triangles after a flip have areas of at least 0.01 of the square of their longest side.
     pub fn stays_thick(&self, h: HalfedgeId) -> bool {
         let Some([hn, hp, tn, tp]) = self.quad(h) else {
             return false;
