@@ -6,7 +6,7 @@
 //! point there: the faces are rasterised one by one, positions are interpolated on the face in `f64`
 //! and rounded once. A centre on an edge belongs to the lower face. Outside, every channel is that of
 //! the nearest covered texel (of several the one further left, then further up), so no value is ever
-//! missing. Attributes of the source come in a second pass (`attributes`). Along a side that two rectangles share both images hold the same points (`shared`). The same for any number of threads.
+//! missing. Attributes of the source come in a second pass (`attributes`). The same for any number of threads.
 
 mod attributes;
 mod channels;
@@ -14,7 +14,6 @@ mod dilation;
 mod image;
 mod interpolation;
 mod packed;
-mod shared;
 
 pub use attributes::{SourceSurface, sample_attributes};
 pub use channels::{Channel, ImageParams, Precision};
@@ -73,14 +72,12 @@ pub fn sample(
             .iter()
             .find(|a| a.kind == AttributeKind::Normal && a.components == 3),
     };
-    let mut images: Vec<GeometryImage> = layout
+    layout
         .patches
         .par_iter()
         .zip(faces)
         .map(|(patch, faces)| sample_patch(&surface, layout, patch, &faces))
-        .collect();
-    shared::unite(layout, &mut images);
-    images
+        .collect()
 }
 
 struct Surface<'a> {
@@ -236,7 +233,6 @@ mod tests {
             &sample.cut,
             &sample.development,
             None,
-            Domain::Flat,
             &PatchParams::default(),
         )
         .unwrap();
@@ -318,16 +314,7 @@ mod tests {
             texel_budget: 10_000,
             ..PatchParams::default()
         };
-        let layout = layout(
-            &s.mesh,
-            &s.length,
-            &s.cut,
-            &s.development,
-            None,
-            Domain::Flat,
-            &params,
-        )
-        .unwrap();
+        let layout = layout(&s.mesh, &s.length, &s.cut, &s.development, None, &params).unwrap();
         let images = sample(&s.mesh, &layout, &s.log_scale, [0.0; 3]);
         let c = &s.mesh.connectivity;
         let mut located = 0;

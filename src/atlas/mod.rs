@@ -10,5 +10,4 @@ pub mod patch;
 pub mod patches;
 pub mod plane;
 pub(crate) mod raster;
-pub mod rectangles;
 mod texels;

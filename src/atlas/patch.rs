@@ -11,14 +11,14 @@ pub const MAX_SIDE: usize = 8192;
 pub struct Patch {
     /// How texels lie in it.
     pub domain: Domain,
-    /// Patch coordinates to central-chart coordinates; none for a rectangle or a block, which are no similar pictures of it.
+    /// Patch coordinates to central-chart coordinates; none for a block of the grid, which is no similar picture of it.
     pub to_chart: Option<Similarity>,
     /// Columns of the image.
     pub width: usize,
     /// Rows of the image.
     pub height: usize,
     /// (column, row, 1), row 0 at the top, to patch coordinates. The centre of texel (0, 0) is (0.5, 0.5), and there a flat
-    /// patch is sampled; a rectangle is sampled at whole numbers, from (0, 0) at its upper left corner on.
+    /// patch is sampled; a block is sampled at whole numbers, and its row 0 is its lowest.
     pub texel_to_patch: [[f64; 3]; 2],
     /// Where the patch lies in the packed unit square: `packed = uv * scale + offset`, v up.
     pub packed_scale: f64,
@@ -41,11 +41,9 @@ pub struct Patch {
 #[serde(rename_all = "kebab-case")]
 pub enum Domain {
     /// A similarity of the central chart, sampled at texel centres, with a mask.
-    #[default]
     Flat,
-    /// A rectangle, sampled at grid corners from border to border: a full grid.
-    Rectangle,
     /// A block of cells of the integer grid, sampled from border to border.
+    #[default]
     Grid,
 }
 
@@ -55,9 +53,7 @@ impl Domain {
     pub fn to_centres(self, texel_to_patch: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
         match self {
             Self::Flat => texel_to_patch,
-            Self::Rectangle | Self::Grid => {
-                texel_to_patch.map(|[a, b, c]| [a, b, c - 0.5 * (a + b)])
-            }
+            Self::Grid => texel_to_patch.map(|[a, b, c]| [a, b, c - 0.5 * (a + b)]),
         }
     }
 }
@@ -74,7 +70,7 @@ pub struct Seam {
 }
 
 impl Seam {
-    /// Whether both sides have the same coordinates in one patch. Inside a rectangle, which may lie across the cut, this is no border; where a flat patch is slit open it is.
+    /// Whether both sides have the same coordinates in one patch. Inside a block, which may lie across the cut, this is no border; where a flat patch is slit open it is.
     pub fn is_inner(&self) -> bool {
         self.right == Some(self.left) && self.samples.iter().all(|s| s.left == s.right)
     }

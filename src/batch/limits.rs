@@ -108,19 +108,15 @@ const PER_TEXEL: u64 = 350;
 /// Most memory that building an asset is expected to take, bytes: a rule of thumb by which jobs are held back, not a limit.
 #[must_use]
 pub fn estimate(input_bytes: u64, config: &Config) -> u64 {
-    let texels = texels(config);
-    let images = match config.images.domain {
-        Domain::Flat | Domain::Grid => texels.saturating_mul(PER_TEXEL),
-        Domain::Rectangle => texels.saturating_mul(2 * PER_TEXEL),
-    };
+    let images = texels(config).saturating_mul(PER_TEXEL);
     BASE.saturating_add(input_bytes.saturating_mul(PER_BYTE))
         .saturating_add(images)
 }
 
 /// Texels of a mesh, about.
 fn texels(config: &Config) -> u64 {
-    match config.images.domain {
-        Domain::Flat | Domain::Rectangle => config.patches.texel_budget as u64,
+    match config.domain() {
+        Domain::Flat => config.patches.texel_budget as u64,
         Domain::Grid => config.grid.texels() as u64,
     }
 }
@@ -131,8 +127,6 @@ const BASE_TIME: u64 = 100;
 /// Per mebibyte of input: 1.5 s to 2 s for these, 7 s for kitten.obj; by more than between linear and n log n they differ in shape. Each
 /// component of a file of many costs as much as a mesh, but how many there are is not known before it is read.
 const TIME_PER_MEBIBYTE: u64 = 2_500;
-/// The same where patches are divided into rectangles.
-const TIME_PER_MEBIBYTE_OF_RECTANGLES: u64 = 7_000;
 /// Per 2²⁰ texels.
 const TIME_PER_MEBITEXEL: u64 = 7_000;
 /// Per 2²⁰ pixels of a picture; there are always as many pictures.
@@ -153,16 +147,12 @@ pub fn expected_time(input_bytes: u64, config: &Config, build: bool) -> u64 {
     if !build {
         return LOOKING_TIME.saturating_add(part(input_bytes, HASHING_TIME_PER_MEBIBYTE));
     }
-    let per_mebibyte = match config.images.domain {
-        Domain::Flat | Domain::Grid => TIME_PER_MEBIBYTE,
-        Domain::Rectangle => TIME_PER_MEBIBYTE_OF_RECTANGLES,
-    };
     let pixels = match config.pictures.enabled {
         true => (config.pictures.size as u64).saturating_pow(2),
         false => 0,
     };
     BASE_TIME
-        .saturating_add(part(input_bytes, per_mebibyte))
+        .saturating_add(part(input_bytes, TIME_PER_MEBIBYTE))
         .saturating_add(part(texels(config), TIME_PER_MEBITEXEL))
         .saturating_add(part(pixels, TIME_PER_MEBIPIXEL))
 }

@@ -213,7 +213,7 @@ vertices of each, and angles between normals.";
 
 const FIT_EXAMPLES: &str = "\
 Examples:
-  affine-atlas build bunny.obj --set images.domain=rectangle
+  affine-atlas build bunny.obj
   affine-atlas fit affine-atlas-out/bunny
   affine-atlas fit affine-atlas-out/bunny -o bunny-splines --spacing 2 --against bunny.obj
 

@@ -184,7 +184,14 @@ fn check_value(
             }
         }
         (Kind::Choice(words), DeValue::String(given)) => {
-            if !words.contains(&given.as_ref()) {
+            if let Some(instead) = keys::removed_word(path, given) {
+                errors.push(ConfigError::RemovedWord {
+                    at: source.at(value.span()),
+                    key: path.to_owned(),
+                    word: given.to_string(),
+                    instead,
+                });
+            } else if !words.contains(&given.as_ref()) {
                 errors.push(ConfigError::UnknownChoice {
                     at: source.at(value.span()),
                     key: path.to_owned(),

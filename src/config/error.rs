@@ -1,5 +1,6 @@
 //! What can be wrong with a configuration, with the place in the text.
 
+use crate::atlas::patch::Domain;
 use std::fmt;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -138,6 +139,18 @@ pub enum ConfigError {
         /// What is so in its stead.
         instead: &'static str,
     },
+    /// A word that a key had in an earlier version.
+    #[error("{at}: `{key}` is not {word:?} any more: {instead}")]
+    RemovedWord {
+        /// Where.
+        at: Box<Location>,
+        /// Its full path.
+        key: String,
+        /// As given.
+        word: String,
+        /// What is so in its stead.
+        instead: &'static str,
+    },
     /// A value of another type than the key takes.
     #[error("{at}: `{key}` takes {expected}, but was given {got}")]
     WrongType {
@@ -204,23 +217,25 @@ pub enum ConfigError {
         /// The key of the file.
         file: &'static str,
     },
-    /// A key for flat images, but patches that are not flat.
-    #[error("`{key}` {does}, but `images.domain` is \"{domain}\"")]
-    OnlyFlat {
+    /// A setting that has a meaning without the domain only that was written.
+    #[error(
+        "`{key}` is for {}, but `images.domain` is \"{}\"",
+        if *domain == Domain::Grid { "flat patches" } else { "grids" },
+        if *domain == Domain::Grid { "grid" } else { "flat" }
+    )]
+    Domain {
         /// The key.
         key: &'static str,
-        /// The domain.
-        domain: &'static str,
-        /// What it does with flat images.
-        does: &'static str,
+        /// The domain as written.
+        domain: Domain,
     },
-    /// A key with which there is no grid, but a grid.
-    #[error("`images.domain` is \"grid\", which needs `{key} = \"{wanted}\"`")]
-    NoGrid {
-        /// The key.
-        key: &'static str,
-        /// What it must be.
-        wanted: &'static str,
+    /// Two settings of which one has a meaning for flat patches only, the other for grids only.
+    #[error("`{flat}` is for flat patches, but `{grid}` is for grids")]
+    Domains {
+        /// A key for flat patches.
+        flat: &'static str,
+        /// A key for grids.
+        grid: &'static str,
     },
     /// A key of an `[[asset]]` table that no single mesh can have.
     #[error("{at}: `{key}` concerns the whole run and not single meshes")]
@@ -260,13 +275,14 @@ impl ConfigError {
             | Self::TooLong { .. }
             | Self::NoListFile { .. }
             | Self::ListAndFile { .. }
-            | Self::OnlyFlat { .. }
-            | Self::NoGrid { .. }
+            | Self::Domain { .. }
+            | Self::Domains { .. }
             | Self::OverrideWithoutValue { .. } => None,
             Self::Syntax { at, .. }
             | Self::FileLine { at, .. }
             | Self::UnknownKey { at, .. }
             | Self::RemovedKey { at, .. }
+            | Self::RemovedWord { at, .. }
             | Self::WrongType { at, .. }
             | Self::UnknownChoice { at, .. }
             | Self::OutOfRange { at, .. }
@@ -308,12 +324,14 @@ impl ConfigError {
                 format!("each line holds {line}; `{key}_first_vertex` says where numbers begin")
             }
             Self::ListAndFile { .. } => "remove one of them".to_owned(),
-            Self::OnlyFlat { key, .. } => {
-                format!("set `images.domain = \"flat\"`, or leave `{key}` out")
+            Self::Domain { key, domain } => {
+                let other = match domain {
+                    Domain::Grid => "flat",
+                    Domain::Flat => "grid",
+                };
+                format!("leave `{key}` out, or set `images.domain = \"{other}\"`")
             }
-            Self::NoGrid { key, .. } => {
-                format!("leave `{key}` out, or set `images.domain = \"flat\"`")
-            }
+            Self::Domains { flat, grid } => format!("leave `{flat}` or `{grid}` out"),
             Self::NotForOneAsset { .. } => "write it outside of the `[[asset]]` tables".to_owned(),
             Self::NotOnePattern { .. } => {
                 "give one of them, for example `glob = \"scans/*.ply\"`".to_owned()
@@ -334,7 +352,9 @@ impl ConfigError {
                 format!("the sections are {}", list(known))
             }
             Self::UnknownKey { known, .. } => format!("known here: {}", list(known)),
-            Self::RemovedKey { key, .. } => format!("remove `{key}`"),
+            Self::RemovedKey { key, .. } | Self::RemovedWord { key, .. } => {
+                format!("remove `{key}`")
+            }
             Self::UnknownChoice {
                 nearest, allowed, ..
             } => match nearest {

@@ -105,10 +105,31 @@ impl fmt::Display for Kind {
 }
 
 /// Keys of earlier versions, each with what is so in its stead.
-const REMOVED: [(&str, &str); 1] = [(
-    "cones.objective",
-    "cones are chosen by one measure that weighs growing and shrinking alike and is near the best of both that there were",
+const REMOVED: [(&str, &str); 2] = [
+    (
+        "cones.objective",
+        "cones are chosen by one measure that weighs growing and shrinking alike and is near the best of both that there were",
+    ),
+    (
+        "patches.shared_lattice",
+        "images.domain = \"grid\" has one lattice on the whole surface, across the cut and around handles too",
+    ),
+];
+
+/// Words of earlier versions: key, word, and what is so in its stead.
+const REMOVED_WORDS: [(&str, &str, &str); 1] = [(
+    "images.domain",
+    "rectangle",
+    "images.domain = \"grid\" samples rectangles of one grid on the whole surface, whose sides hold the same points",
 )];
+
+/// What is so in the stead of a word that a key had in earlier versions.
+pub fn removed_word(path: &str, word: &str) -> Option<&'static str> {
+    let found = REMOVED_WORDS
+        .iter()
+        .find(|(key, old, _)| *key == path && *old == word);
+    found.map(|(_, _, instead)| *instead)
+}
 
 /// What is so in the stead of a key that earlier versions had.
 pub fn removed(path: &str) -> Option<&'static str> {
@@ -507,7 +528,6 @@ pub const KEYS: &[Key] = &[
         "texels",
         "absent",
     ),
-    key("patches.shared_lattice", Kind::Bool, "", "false"),
     key(
         "grid.cells",
         Kind::Integer {
@@ -525,9 +545,9 @@ pub const KEYS: &[Key] = &[
     ),
     key(
         "images.domain",
-        Kind::Choice(&["flat", "rectangle", "grid"]),
+        Kind::Choice(&["grid", "flat"]),
         "",
-        "\"flat\"",
+        "absent",
     ),
     key(
         "images.channels",

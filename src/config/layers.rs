@@ -9,9 +9,6 @@ use super::error::ConfigError;
 use super::overrides::{self, Override};
 use super::presets::Preset;
 use super::source::{Source, refused, syntax};
-use crate::atlas::patch::Domain;
-use crate::flow::cones::ConeStrategy;
-use crate::flow::ricci::Holonomy;
 use toml::de::DeTable;
 
 /// All that was written, in layers.
@@ -42,49 +39,8 @@ impl Layers {
         let config: Result<Config, toml::de::Error> = toml::Value::Table(merged).try_into();
         let nowhere = Source::new("configuration", "");
         let source = self.last.as_ref().unwrap_or(&nowhere);
-        let config = config.map_err(|error| refused(source, &error))?;
-        match only_flat(&config) {
-            Some((key, does)) if config.images.domain != Domain::Flat => {
-                let domain = match config.images.domain {
-                    Domain::Grid => "grid",
-                    _ => "rectangle",
-                };
-                Err(ConfigError::OnlyFlat { key, domain, does })
-            }
-            _ => for_grid(config),
-        }
+        config.map_err(|error| refused(source, &error))?.resolved()
     }
-}
-
-/// With what a grid needs, where one is asked for: in place of defaults, whether these are written or not. Anything else that is set and gives no grid is refused.
-fn for_grid(mut config: Config) -> Result<Config, ConfigError> {
-    if config.images.domain != Domain::Grid {
-        return Ok(config);
-    }
-    let default = Config::default();
-    if config.cones.strategy == default.cones.strategy {
-        config.cones.strategy = ConeStrategy::Field;
-    }
-    if config.flow.holonomy == default.flow.holonomy {
-        config.flow.holonomy = Holonomy::QuarterTurns;
-    }
-    match config.cones.strategy {
-        ConeStrategy::Field => Ok(config),
-        _ => Err(ConfigError::NoGrid {
-            key: "cones.strategy",
-            wanted: "field",
-        }),
-    }
-}
-
-/// A key that is given and means nothing but for flat images, and what it does with them.
-fn only_flat(config: &Config) -> Option<(&'static str, &'static str)> {
-    let patches = &config.patches;
-    if patches.packed_side.is_some() {
-        return Some(("patches.packed_side", "packs flat images into one"));
-    }
-    let shared = ("patches.shared_lattice", "is for flat images");
-    patches.shared_lattice.then_some(shared)
 }
 
 /// What the preset sets, if one is named: it lies below everything that the user wrote, wherever its name stands.

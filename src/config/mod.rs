@@ -10,6 +10,7 @@
 
 pub mod assets;
 mod check;
+mod domain;
 pub mod error;
 pub mod keys;
 mod layers;
@@ -32,7 +33,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// The commented configuration of this repository. It parses to [`Config::default`] but for `input.paths`, which names a fixture.
+/// The commented configuration of this repository. It parses to the resolved [`Config::default`] but for `input.paths`, which names a fixture.
 pub const COMMENTED_DEFAULT: &str = include_str!("../../config.toml");
 
 /// The commented configuration that `affine-atlas init` writes: its `input.paths` stands for all meshes in and below its own folder, however

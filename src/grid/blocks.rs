@@ -30,6 +30,44 @@ pub struct Piece {
     pub across: Option<(usize, usize, usize)>,
 }
 
+impl Block {
+    /// The same turned by quarters, counterclockwise.
+    pub(super) fn turned(&self, turns: u8) -> Self {
+        let [w, h] = self.cells;
+        let turns = turns & 3;
+        let cells = if turns & 1 == 1 { [h, w] } else { [w, h] };
+        let old = |i: usize, j: usize| match turns {
+            0 => (i, j),
+            1 => (j, h - 1 - i),
+            2 => (w - 1 - i, h - 1 - j),
+            _ => (w - 1 - j, i),
+        };
+        let squares = (0..cells[1]).flat_map(|j| (0..cells[0]).map(move |i| old(i, j)));
+        let squares = squares.map(|(i, j)| {
+            let (q, k) = self.squares[j * w + i];
+            (q, (k + 4 - turns) & 3)
+        });
+        Self {
+            cells,
+            squares: squares.collect(),
+        }
+    }
+}
+
+/// The point at column i and row j of the corners of a block's squares.
+pub(super) fn corner(mesh: &QuadMesh, block: &Block, [i, j]: [usize; 2]) -> u32 {
+    let [w, h] = block.cells;
+    let (column, row) = (i.min(w - 1), j.min(h - 1));
+    let (q, k) = block.squares[row * w + column];
+    let turn = match (i > column, j > row) {
+        (false, false) => 0,
+        (true, false) => 1,
+        (true, true) => 2,
+        (false, true) => 3,
+    };
+    mesh.quads[q as usize][usize::from((k + turn) & 3)]
+}
+
 /// Blocks with their sides: bottom, right, top, left.
 #[derive(Clone, Debug)]
 pub struct Blocks {
@@ -57,7 +95,7 @@ impl QuadMesh {
         let mut blocks = walls.rectangles()?;
         walls.join(&mut blocks)?;
         walls.part(&mut blocks)?;
-        let sides = walls.sides(&blocks)?;
+        let sides = sides(self, &blocks)?;
         Ok(Blocks { blocks, sides })
     }
 
@@ -259,7 +297,7 @@ impl Walls<'_> {
     /// Makes one of two blocks that share a whole side of both.
     fn join(&mut self, blocks: &mut Vec<Block>) -> Result<(), GridError> {
         loop {
-            let sides = self.sides(blocks)?;
+            let sides = sides(self.mesh, blocks)?;
             // By length, then by block and side.
             let mut best: Option<(usize, usize, usize)> = None;
             for (b, of_block) in sides.iter().enumerate() {
@@ -306,7 +344,7 @@ impl Walls<'_> {
     /// Divides blocks that lie beside themselves, as far as they have squares for that.
     fn part(&mut self, blocks: &mut Vec<Block>) -> Result<(), GridError> {
         loop {
-            let sides = self.sides(blocks)?;
+            let sides = sides(self.mesh, blocks)?;
             let beside_itself = |(b, of): (usize, &[Vec<Piece>; 4])| {
                 let [w, h] = blocks[b].cells;
                 let own = (0..4).flat_map(|s| of[s].iter().map(move |p| (s, p)));
@@ -341,53 +379,53 @@ impl Walls<'_> {
             blocks.push(other.ok_or_else(missing)?);
         }
     }
+}
 
-    /// What lies across the sides of blocks.
-    fn sides(&self, blocks: &[Block]) -> Result<Vec<[Vec<Piece>; 4]>, GridError> {
-        // Block, side and number along it of every side of a square on the border of its block.
-        let mut along: BTreeMap<(u32, u8), (usize, usize, usize)> = BTreeMap::new();
-        for (b, block) in blocks.iter().enumerate() {
-            for s in 0..4 {
-                for (i, side) in side_of(block, s).into_iter().enumerate() {
-                    along.insert(side, (b, s, i));
-                }
+/// What lies across the sides of blocks.
+pub(super) fn sides(mesh: &QuadMesh, blocks: &[Block]) -> Result<Vec<[Vec<Piece>; 4]>, GridError> {
+    // Block, side and number along it of every side of a square on the border of its block.
+    let mut along: BTreeMap<(u32, u8), (usize, usize, usize)> = BTreeMap::new();
+    for (b, block) in blocks.iter().enumerate() {
+        for s in 0..4 {
+            for (i, side) in side_of(block, s).into_iter().enumerate() {
+                along.insert(side, (b, s, i));
             }
         }
-        let of = |block: &Block, s: usize| -> Result<Vec<Piece>, GridError> {
-            let mut pieces: Vec<Piece> = Vec::new();
-            for (i, (q, k)) in side_of(block, s).into_iter().enumerate() {
-                let across = match self.mesh.across[q as usize][usize::from(k)] {
-                    Some(there) => {
-                        let square = there.0;
-                        let missing = GridError::NoRectangle { square };
-                        Some(*along.get(&there).ok_or(missing)?)
-                    }
-                    None => None,
-                };
-                let goes_on = |piece: &Piece| match (piece.across, across) {
-                    (Some((b, s, last)), Some((c, t, at))) => (b, s) == (c, t) && at + 1 == last,
-                    (None, None) => true,
-                    _ => false,
-                };
-                match pieces.last_mut() {
-                    Some(piece) if goes_on(piece) => {
-                        piece.length += 1;
-                        piece.across = across;
-                    }
-                    _ => pieces.push(Piece {
-                        start: i,
-                        length: 1,
-                        across,
-                    }),
-                }
-            }
-            Ok(pieces)
-        };
-        let all = blocks
-            .iter()
-            .map(|block| Ok([of(block, 0)?, of(block, 1)?, of(block, 2)?, of(block, 3)?]));
-        all.collect()
     }
+    let of = |block: &Block, s: usize| -> Result<Vec<Piece>, GridError> {
+        let mut pieces: Vec<Piece> = Vec::new();
+        for (i, (q, k)) in side_of(block, s).into_iter().enumerate() {
+            let across = match mesh.across[q as usize][usize::from(k)] {
+                Some(there) => {
+                    let square = there.0;
+                    let missing = GridError::NoRectangle { square };
+                    Some(*along.get(&there).ok_or(missing)?)
+                }
+                None => None,
+            };
+            let goes_on = |piece: &Piece| match (piece.across, across) {
+                (Some((b, s, last)), Some((c, t, at))) => (b, s) == (c, t) && at + 1 == last,
+                (None, None) => true,
+                _ => false,
+            };
+            match pieces.last_mut() {
+                Some(piece) if goes_on(piece) => {
+                    piece.length += 1;
+                    piece.across = across;
+                }
+                _ => pieces.push(Piece {
+                    start: i,
+                    length: 1,
+                    across,
+                }),
+            }
+        }
+        Ok(pieces)
+    };
+    let all = blocks
+        .iter()
+        .map(|block| Ok([of(block, 0)?, of(block, 1)?, of(block, 2)?, of(block, 3)?]));
+    all.collect()
 }
 
 /// Squares along a side of a block, counterclockwise, with their sides there.

@@ -3,7 +3,7 @@
 //! *Enters:* a [`GridMap`] after [`cut`](super::cut), the quad mesh and its blocks. *Leaves:* the block of every face, its coordinates there, and where the points of the quad mesh lie in space. *Guaranteed:* every face is in one
 //! block, coordinates are exact, points on borders of blocks are vertices.
 
-use super::blocks::{Block, Blocks};
+use super::blocks::{Blocks, corner};
 use super::complex::turned;
 use super::cut::Placed;
 use super::error::GridError;
@@ -20,20 +20,6 @@ pub(crate) struct Located {
     pub uv: FaceVec<[[f64; 2]; 3]>,
     /// Points of the quad mesh, source units.
     pub points: Vec<[f64; 3]>,
-}
-
-/// The point at column i and row j of the corners of a block's squares.
-fn corner(mesh: &QuadMesh, block: &Block, [i, j]: [usize; 2]) -> u32 {
-    let [w, h] = block.cells;
-    let (column, row) = (i.min(w - 1), j.min(h - 1));
-    let (q, k) = block.squares[row * w + column];
-    let turn = match (i > column, j > row) {
-        (false, false) => 0,
-        (true, false) => 1,
-        (true, true) => 2,
-        (false, true) => 3,
-    };
-    mesh.quads[q as usize][usize::from((k + turn) & 3)]
 }
 
 /// Locates faces and points.

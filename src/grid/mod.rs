@@ -10,9 +10,11 @@ pub(crate) mod cut;
 pub(crate) mod dirichlet;
 mod distortion;
 mod error;
+pub mod islands;
 pub mod lattice;
 mod layout;
 pub(crate) mod map;
+mod packing;
 mod params;
 mod patches;
 pub mod quads;
@@ -35,6 +37,7 @@ use crate::geometry::ids::{EdgeVec, FaceVec, HalfedgeId, HalfedgeVec, VertexId};
 use crate::geometry::mesh::{Mesh, triangle_area};
 use crate::geometry::subdivision::Subdivision;
 use blocks::Blocks;
+use islands::Islands;
 use map::GridMap;
 use quads::QuadMesh;
 use std::collections::BTreeSet;
@@ -60,6 +63,8 @@ pub struct Grid {
     pub vertex: Vec<Option<VertexId>>,
     /// Rectangles of squares; the first of each is at its bottom left.
     pub blocks: Blocks,
+    /// How blocks lie in the square of `TEXCOORD_0`.
+    pub islands: Islands,
     /// How far the map is from an isometry.
     pub distortion: Distortion,
 }
@@ -85,10 +90,16 @@ pub fn grid(
     patches: &PatchParams,
 ) -> Result<(Charted, PatchLayout, Grid), Box<(Charted, GridError)>> {
     let lines = lines(&surface, params.cells);
-    match made(&surface.mesh, &surface.central.uv, &lines, params) {
+    match made(
+        &surface.mesh,
+        &surface.central.uv,
+        &lines,
+        params,
+        patches.padding,
+    ) {
         Ok((map, grid, located)) => {
             let surface = charted::lift(surface, &map.sheet.fine);
-            let layout = patches::layout(&surface, &grid, located, patches);
+            let layout = patches::layout(&surface, &grid, located);
             Ok((surface, layout, grid))
         }
         Err(error) => Err(Box::new((surface, error))),
@@ -101,6 +112,7 @@ fn made(
     central: &FaceVec<[[f64; 2]; 3]>,
     lines: &EdgeVec<bool>,
     params: &GridParams,
+    gutter: usize,
 ) -> Result<(GridMap, Grid, layout::Located), GridError> {
     let c = &mesh.connectivity;
     let flat = cone_triangulation::complex(c, central, lines)?;
@@ -124,7 +136,8 @@ fn made(
     if !quads.is_simple() {
         return Err(GridError::NoCells);
     }
-    let blocks = quads.blocks()?;
+    let mut blocks = quads.blocks()?;
+    let islands = islands::arrange(&quads, &mut blocks, params.samples_per_cell, gutter)?;
     let mut fine = Subdivision::identity(mesh);
     for h in c.halfedges() {
         fine.corner[h].uv = central[c.face(h)][c.corner(h)];
@@ -173,6 +186,7 @@ fn made(
             .collect(),
         quads,
         blocks,
+        islands,
     };
     Ok((map, grid, located))
 }

@@ -3,38 +3,27 @@
 use super::Grid;
 use super::layout::Located;
 use crate::atlas::charted::Charted;
-use crate::atlas::patches::{Domain, Patch, PatchLayout, PatchParams, packed, seams};
+use crate::atlas::patches::{Domain, Patch, PatchLayout, seams};
 use crate::geometry::ids::{FaceVec, PatchId};
 
 /// Blocks as patches.
-pub(super) fn layout(
-    surface: &Charted,
-    grid: &Grid,
-    located: Located,
-    params: &PatchParams,
-) -> PatchLayout {
+pub(super) fn layout(surface: &Charted, grid: &Grid, located: Located) -> PatchLayout {
     let samples = grid.samples_per_cell;
-    let contents: Vec<[f64; 2]> = grid
-        .blocks
-        .blocks
-        .iter()
-        .map(|block| block.cells.map(|n| (n * samples) as f64))
-        .collect();
-    let gutter = 2 * params.padding.max(1);
-    let sizes: Vec<[usize; 2]> = contents
-        .iter()
-        .map(|content| content.map(|x| x as usize + gutter))
-        .collect();
     let step = 1.0 / samples as f64;
-    let images = grid.blocks.blocks.iter().zip(packed(&sizes, &contents));
-    let patches = images.map(|(block, (scale, packed_offset))| Patch {
+    let islands = &grid.islands;
+    let side = islands.side as f64;
+    let blocks = grid.blocks.blocks.iter().zip(&islands.place);
+    let patches = blocks.map(|(block, &(island, at))| Patch {
         domain: Domain::Grid,
         to_chart: None,
         width: block.cells[0] * samples + 1,
         height: block.cells[1] * samples + 1,
         texel_to_patch: [[step, 0.0, 0.0], [0.0, step, 0.0]],
-        packed_scale: scale / block.cells[0] as f64,
-        packed_offset,
+        packed_scale: samples as f64 / side,
+        packed_offset: [0, 1].map(|i| {
+            let texel = islands.corner[island][i] + at[i] * samples;
+            texel as f64 / side
+        }),
     });
     let patches = patches.collect();
     let face_patch = located.block.iter().map(|&b| PatchId::new(b as usize));

@@ -490,7 +490,8 @@ fn assert_gridded(squares: &Squares, cells: usize) -> super::Grid {
         samples_per_cell: 3,
     };
     let mesh = mesh(squares);
-    let (map, grid, located) = super::made(&mesh, &squares.uv, &squares.is_line, &params).unwrap();
+    let (map, grid, located) =
+        super::made(&mesh, &squares.uv, &squares.is_line, &params, 2).unwrap();
     let c = &map.sheet.fine.connectivity;
     c.validate().unwrap();
     for h in c.halfedges() {

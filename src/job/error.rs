@@ -6,7 +6,7 @@ use crate::atlas::cut::CutError;
 use crate::atlas::develop::DevelopError;
 use crate::atlas::overlay::OverlayError;
 use crate::atlas::patches::PatchError;
-use crate::atlas::rectangles::RectangleError;
+use crate::config::ConfigError;
 use crate::export::ExportError;
 use crate::flow::cones::ConeError;
 use crate::flow::refine::{self, RefineError};
@@ -21,6 +21,9 @@ use crate::verify::{Check, Verdicts};
 /// Why there is no atlas: the error of the stage that stopped.
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
+    /// Settings contradict each other.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
     /// The file was refused.
     #[error(transparent)]
     Read(#[from] ReadError),
@@ -54,9 +57,6 @@ pub enum BuildError {
     /// The patches could not be made.
     #[error(transparent)]
     Patch(#[from] PatchError),
-    /// The patches could not be made rectangles.
-    #[error(transparent)]
-    Rectangle(#[from] RectangleError),
     /// What was written did not pass its own checks, and was not published.
     #[error(transparent)]
     Unverified(#[from] Unverified),
@@ -129,7 +129,9 @@ impl BuildError {
             BuildError::Read(_) | BuildError::Repair(_) | BuildError::Component(_) => {
                 FailureKind::Input
             }
-            BuildError::Cones(_) | BuildError::Refine(_) => FailureKind::Prescription,
+            BuildError::Config(_) | BuildError::Cones(_) | BuildError::Refine(_) => {
+                FailureKind::Prescription
+            }
             BuildError::Flow(
                 FlowError::Infeasible(_)
                 | FlowError::BadTarget { .. }
@@ -141,10 +143,6 @@ impl BuildError {
             BuildError::Flow(FlowError::BadLength { .. }) => FailureKind::Input,
             BuildError::Flow(_) | BuildError::Develop(_) => FailureKind::NotConverged,
             BuildError::Overlay(OverlayError::TooManyCrossings { .. }) => FailureKind::Input,
-            BuildError::Rectangle(
-                RectangleError::TooManyPieces { .. }
-                | RectangleError::Overlay(OverlayError::TooManyCrossings { .. }),
-            ) => FailureKind::Input,
             BuildError::Overlay(_) => FailureKind::Internal,
             BuildError::Cut(CutError::NothingToCutAlong) => FailureKind::Prescription,
             BuildError::Cut(_) => FailureKind::Internal,
@@ -152,12 +150,6 @@ impl BuildError {
             BuildError::Chart(ChartError::Develop(_)) => FailureKind::NotConverged,
             BuildError::Patch(PatchError::NotFinite { .. }) => FailureKind::NotConverged,
             BuildError::Patch(_) => FailureKind::Prescription,
-            BuildError::Rectangle(
-                RectangleError::Flow { .. }
-                | RectangleError::Unequal { .. }
-                | RectangleError::Folded { .. },
-            ) => FailureKind::NotConverged,
-            BuildError::Rectangle(_) => FailureKind::Internal,
             BuildError::Unverified(_) => FailureKind::Unverified,
             BuildError::Precision(_) => FailureKind::NotConverged,
             BuildError::Export(ExportError::NotFinite { .. }) => FailureKind::NotConverged,

@@ -5,6 +5,7 @@ mod existence;
 use super::flatten::prescribed;
 use super::listing::{self, counted};
 use super::{BuildError, refine_for};
+use crate::atlas::patch::Domain;
 use crate::config::Config;
 use crate::export::ExportError;
 use crate::export::glb::region::{self, RegionOf};
@@ -48,10 +49,13 @@ impl fmt::Display for Inspection {
 
 /// Reads and repairs an asset, and says topology, Gauss–Bonnet budget, cones, and what would change.
 pub fn inspect(path: &Path, config: &Config) -> Result<Inspection, BuildError> {
+    let config = &config.clone().resolved()?;
+    let otherwise = &config.on_flat_patches();
     let asset = read::read(path, &config.limits)?;
     let soup = &asset.soup;
     let repaired = repair::repair(soup, &config.repair)?;
-    let requests = cones::assign(&repaired, &config.cones, &config.boundary, &config.features)?;
+    let assigned = |c: &Config| cones::assign(&repaired, &c.cones, &c.boundary, &c.features);
+    let (requests, of_flat) = (assigned(config)?, assigned(otherwise)?);
     let mut text = String::new();
     let count = repaired.components.len();
     let mut line = |s: String| {
@@ -67,7 +71,8 @@ pub fn inspect(path: &Path, config: &Config) -> Result<Inspection, BuildError> {
         line(format!("note: {note}"));
     }
     let (mut failures, mut regions) = (Vec::new(), Vec::new());
-    for (i, (component, requests)) in repaired.components.into_iter().zip(requests).enumerate() {
+    let parts = repaired.components.into_iter().zip(requests).zip(of_flat);
+    for (i, ((component, requests), of_flat)) in parts.enumerate() {
         if count > 1 {
             line(format!("component {i}:"));
         }
@@ -84,7 +89,13 @@ pub fn inspect(path: &Path, config: &Config) -> Result<Inspection, BuildError> {
             frame.leave_all(&mut region.mesh.positions);
             regions.push(region)
         };
-        match plan(component, &requests, config, &mut line, &mut offend) {
+        let again = component.clone();
+        let mut planned = plan(component, &requests, config, &mut line, &mut offend);
+        if let (Err(error), Domain::Grid, Ok(_)) = (&planned, config.domain(), &again.mesh) {
+            line(format!("  no grid, but flat patches: {error}"));
+            planned = plan(again, &of_flat, otherwise, &mut line, &mut offend);
+        }
+        match planned {
             Ok(()) => {}
             Err(error) => {
                 line(format!("  refused: {error}"));

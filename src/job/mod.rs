@@ -1,6 +1,6 @@
 //! The main job: one asset from file to folder.
 //!
-//! `build_component` is the pipeline of the tutorial (5.1) on one page, its first half on another (`flatten`): data only
+//! `pipeline` is that of the tutorial (5.1) on one page, its first half on another (`flatten`): data only
 //! flows forward, and a finished value is never changed. [`build`] does it for every component of a mesh in memory, [`run`] for a file,
 //! [`inspect`] stops before the flow, [`survey`] tries different cones, [`rebuild`] goes back from images to a mesh, [`fit`] on to
 //! spline surfaces, [`texture`] lays a pattern over the surface, [`explain`] says what is wrong.
@@ -11,38 +11,33 @@ pub mod fit;
 mod flatten;
 mod inspect;
 mod listing;
+mod pipeline;
 mod precision;
 mod publication;
 pub mod rebuild;
 mod shares;
 pub mod survey;
 pub mod texture;
+mod warnings;
 
 pub use error::{BuildError, Unverified};
 pub use inspect::{Inspection, inspect};
 pub use precision::{Cause, Precision};
 
-use flatten::{Flattened, flatten, prescribed, refine_for};
+use flatten::refine_for;
+use pipeline::build_component;
 use publication::Publication;
+use warnings::warnings;
 
-use crate::atlas::charted::Charted;
-use crate::atlas::develop::Development;
-use crate::atlas::geometry_image::SourceSurface;
-use crate::atlas::patches::Domain;
-use crate::atlas::{axes, charts, develop, geometry_image, patches, rectangles};
 use crate::config::Config;
 use crate::export::folder::list_files;
-use crate::flow::cones::{self, Requests};
-use crate::geometry::deviation::{Triangles, distances};
+use crate::flow::cones;
 use crate::geometry::mesh::Soup;
-use crate::grid;
 use crate::observe::Observer;
 use crate::outcome::{AssetOutcome, AssetState, ComponentOutcome, Failure, Summary};
 use crate::product::AffineAtlas;
 use crate::read;
-use crate::rebuild::Images;
-use crate::repair::{self, Component};
-use crate::report;
+use crate::repair;
 use std::path::Path;
 use std::time::Instant;
 
@@ -81,15 +76,22 @@ fn each(
 ) -> Result<(), BuildError> {
     observer.stage("repair", 0, 1);
     let repaired = repair::repair(soup, &config.repair)?;
-    let requests = cones::assign(&repaired, &config.cones, &config.boundary, &config.features)?;
     let config = &Config {
         images: config.images.held_by(soup),
-        ..config.clone()
+        ..config.clone().resolved()?
     };
+    let assigned = |c: &Config| cones::assign(&repaired, &c.cones, &c.boundary, &c.features);
+    let requests = assigned(config)?;
+    let otherwise = assigned(&config.on_flat_patches())?;
     let shares = shares::shares(&repaired.components);
     let components = repaired.components.len();
-    let parts = repaired.components.into_iter().zip(requests).zip(shares);
-    for (index, ((component, requests), share)) in parts.enumerate() {
+    let parts = repaired
+        .components
+        .into_iter()
+        .zip(requests)
+        .zip(otherwise)
+        .zip(shares);
+    for (index, (((component, requests), otherwise), share)) in parts.enumerate() {
         let config = &shares::of_share(config, share);
         let stages = Observed {
             observer,
@@ -101,7 +103,7 @@ fn each(
             index,
             components,
             config,
-            atlas: build_component(component, &requests, config, observer, enter),
+            atlas: build_component(component, [requests, otherwise], config, observer, enter),
         })?;
     }
     Ok(())
@@ -123,162 +125,6 @@ impl Observed<'_> {
         self.observer.stage(stage, self.component, self.components);
         Ok(())
     }
-}
-
-/// The pipeline. `enter` is told each stage's name before it begins, and may stop the job.
-fn build_component(
-    component: Component,
-    requests: &Requests,
-    config: &Config,
-    observer: &dyn Observer,
-    enter: impl Fn(&'static str) -> Result<(), BuildError>,
-) -> Result<AffineAtlas, BuildError> {
-    enter("cones")?;
-    let frame = component.frame;
-    let mesh = component.mesh?;
-    let prescription = prescribed(&mesh, requests, config)?;
-    let (given, given_faces) = (mesh.positions.clone(), mesh.connectivity.to_faces());
-    let source = SourceSurface::of(&mesh, &config.images);
-    let Flattened {
-        mesh,
-        metric,
-        prescription,
-        layout,
-        layout_cut,
-        cut,
-        connectivity_repair,
-    } = flatten(mesh, prescription, config, observer, &enter)?;
-    let c = &mesh.connectivity;
-    enter("charts")?;
-    let mut unfolded = develop::develop(&layout, layout_cut)?;
-    let mut central = Development::place(c, &cut, &layout, &unfolded);
-    if let Some(met) = &metric.quarter_turns {
-        let axis = axes::axis(&mesh, &cut, &central, &met.lines);
-        unfolded.turn(-axis);
-        central.turn(-axis);
-    }
-    let mut charts = charts::chart(c, &cut, &central, &layout, &unfolded, &prescription)?;
-    if metric.quarter_turns.is_some() {
-        charts.turn_like_central();
-    }
-    let surface = Charted {
-        mesh,
-        metric,
-        prescription,
-        cut,
-        central,
-        charts,
-    };
-    let in_patches = |surface: &Charted, domain: Domain| {
-        let under = Some((&layout, &unfolded));
-        patches::layout(
-            &surface.mesh,
-            &surface.metric.length,
-            &surface.cut,
-            &surface.central,
-            under,
-            domain,
-            &config.patches,
-        )
-    };
-    let (mut grid, mut no_grid) = (None, None);
-    let (surface, patches) = match config.images.domain {
-        Domain::Flat => {
-            enter("patches")?;
-            let patches = in_patches(&surface, Domain::Flat)?;
-            (surface, patches)
-        }
-        Domain::Rectangle => {
-            enter("patches")?;
-            let patches = in_patches(&surface, Domain::Rectangle)?;
-            enter("rectangles")?;
-            let tolerance = config.flow.curvature_tolerance;
-            rectangles::rectangles(surface, &patches, &config.patches, tolerance)?
-        }
-        Domain::Grid => {
-            enter("grid")?;
-            match grid::grid(surface, &config.grid, &config.patches) {
-                Ok((surface, patches, found)) => {
-                    grid = Some(found);
-                    (surface, patches)
-                }
-                Err(refused) => {
-                    let (surface, error) = *refused;
-                    no_grid = Some(error);
-                    enter("patches")?;
-                    let patches = in_patches(&surface, Domain::Flat)?;
-                    (surface, patches)
-                }
-            }
-        }
-    };
-    let Charted {
-        mesh,
-        metric,
-        prescription,
-        cut,
-        central,
-        charts,
-    } = surface;
-    enter("images")?;
-    let image_origin = geometry_image::image_origin(&mesh, &frame);
-    let origin = frame.enter(image_origin);
-    let images = geometry_image::sample(&mesh, &patches, &metric.log_scale, origin);
-    let images = match &source {
-        Some(source) => geometry_image::sample_attributes(&mesh, &patches, images, source),
-        None => images,
-    };
-    let mut images = images;
-    if let Some(grid) = &grid {
-        grid.unite(&mut images);
-    }
-    enter("report")?;
-    let topology = mesh.connectivity.topology();
-    let quality = report::measure(&mesh, &metric, &cut, &central, &charts, &prescription);
-    let given = Triangles {
-        positions: given.as_slice(),
-        faces: &given_faces,
-    };
-    let readable = Images::new(&patches, &images, origin);
-    let (quality, rebuilt) = report::measure_images(
-        quality,
-        given,
-        &readable,
-        topology,
-        config.patches.texel_budget,
-    );
-    let image_distance = rebuilt
-        .filter(|_| config.report.enabled)
-        .and_then(|rebuilt| {
-            let rebuilt = Triangles {
-                positions: &rebuilt.positions,
-                faces: &rebuilt.faces,
-            };
-            distances(mesh.positions.as_slice(), rebuilt)
-        });
-    let atlas = AffineAtlas {
-        topology,
-        seamless: report::is_seamless(&charts),
-        repair: component.log.counts(),
-        repair_log: component.log,
-        image_distance: image_distance.map(Into::into),
-        flow: config.flow.clone(),
-        mesh,
-        prescription,
-        metric,
-        cut,
-        central,
-        charts,
-        patches,
-        grid,
-        no_grid,
-        images,
-        image_params: config.images.clone(),
-        image_origin,
-        connectivity_repair,
-        quality,
-    };
-    Ok(atlas.leave(&frame))
 }
 
 /// Reads, builds and writes one asset into `output/id`. `given` is the path as the user wrote it.
@@ -360,44 +206,4 @@ fn run_stages(
     outcome.files = list_files(&folder).unwrap_or_default();
     outcome.components = parts;
     Ok(())
-}
-
-/// What was asked for and could not be had, and much distortion, beginning with a verb.
-fn warnings(atlas: &AffineAtlas, config: &Config) -> Vec<String> {
-    let mut notes = Vec::new();
-    let (quality, most) = (&atlas.quality, config.report.distortion_warning);
-    if quality.log_scale.std > most {
-        notes.push(format!(
-            "is drawn unevenly: the log scale deviates by {:.2} (report.distortion_warning = {most}), area distortion (9) is {:.2}; more cones help (`affine-atlas cones` shows how much), `affine-atlas explain` shows where",
-            quality.log_scale.std, quality.area_distortion
-        ));
-    }
-    if let Some(met) = &atlas.metric.quarter_turns
-        && !met.given_up.is_empty()
-    {
-        let all = met.lines.len() + met.given_up.len();
-        notes.push(format!(
-            "has {} of {all} features as lines: the others cannot be lines with these, or only in faces without width; atlas.json names them, and a larger features.angle asks for fewer",
-            met.lines.len()
-        ));
-    }
-    if let Some(error) = &atlas.no_grid {
-        notes.push(format!("has flat patches instead of a grid: {error}"));
-    }
-    let params = &config.patches;
-    let count = atlas.patches.patches.len();
-    if let Some(most) = params.max_count.filter(|&most| count > most) {
-        notes.push(format!(
-            "has {count} patches, more than the {most} of patches.max_count: with fewer, patches would overlap"
-        ));
-    }
-    let side = atlas.patches.packed.as_ref().map(|packed| packed.side);
-    if let (Some(most), Some(side)) = (params.packed_side, side)
-        && side > most
-    {
-        notes.push(format!(
-            "needs a packed image of {side} by {side} texels, more than the {most} of patches.packed_side: each of its {count} patches has at least patches.min_side texels"
-        ));
-    }
-    notes
 }

@@ -13,7 +13,7 @@ use crate::flow::ricci::{FlatMetric, FlowParams};
 use crate::geometry::connectivity::Topology;
 use crate::geometry::ids::VertexVec;
 use crate::geometry::mesh::Mesh;
-use crate::grid::{Grid, GridError};
+use crate::grid::Grid;
 use crate::repair::RepairLog;
 use serde::{Deserialize, Serialize};
 
@@ -41,7 +41,7 @@ pub struct AffineAtlas {
     /// The integer grid that the patches are blocks of, where there is one.
     pub grid: Option<Grid>,
     /// Why there is none, where one was asked for.
-    pub no_grid: Option<GridError>,
+    pub no_grid: Option<String>,
     /// One image a patch.
     pub images: Vec<GeometryImage>,
     /// What of them is stored, and how.

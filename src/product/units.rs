@@ -41,7 +41,7 @@ impl AffineAtlas {
             motion(&mut gluing.motion);
             length(&mut gluing.residual);
         }
-        // Coordinates of a rectangle are shares of its width, whatever the units.
+        // Coordinates of a block are cells, whatever the units.
         let has_units = |patch: &Patch| patch.domain == Domain::Flat;
         let units: Vec<bool> = self.patches.patches.iter().map(has_units).collect();
         let side = |patch: PatchId, p: &mut [f64; 2]| {

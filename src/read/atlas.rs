@@ -16,7 +16,7 @@ use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// Version of the output format (`docs/format.md`) that is understood.
-const VERSION: u64 = 1;
+const VERSIONS: std::ops::RangeInclusive<u64> = 1..=2;
 
 /// The number that stands for the surface's boundary in `seam_patch`.
 pub const BOUNDARY: u32 = u32::MAX;
@@ -43,7 +43,7 @@ pub enum FolderError {
     },
     /// Another format, or a version that came later.
     #[error(
-        "{} says format {format:?}, version {version}; this program reads \"affine-atlas\", version {VERSION}",
+        "{} says format {format:?}, version {version}; this program reads \"affine-atlas\", versions 1 and 2",
         path.display()
     )]
     Version {
@@ -56,7 +56,7 @@ pub enum FolderError {
     },
     /// A domain that is not known.
     #[error(
-        "patch {patch} of {} has the domain {domain:?}; it must be \"flat\", \"rectangle\" or \"grid\"",
+        "patch {patch} of {} has the domain {domain:?}; it must be \"flat\" or \"grid\"",
         path.display()
     )]
     Domain {
@@ -134,7 +134,7 @@ pub struct StoredImage {
     pub height: usize,
     /// (column, row, 1) to patch coordinates.
     pub texel_to_patch: [[f64; 3]; 2],
-    /// True where texels are grid corners of a rectangle, false where they are texel centres of a `flat` patch.
+    /// True where texels are grid corners of a block, false where they are texel centres of a `flat` patch.
     pub is_rectangle: bool,
     /// Surface points minus the image origin, row by row from the top.
     pub position: Vec<[f32; 3]>,
@@ -187,7 +187,7 @@ struct Head {
 }
 
 /// Names of the domains.
-const DOMAINS: [&str; 3] = ["flat", "rectangle", "grid"];
+const DOMAINS: [&str; 2] = ["flat", "grid"];
 
 #[derive(Deserialize)]
 struct Patch {
@@ -316,7 +316,7 @@ pub(super) fn checked_json(path: &Path) -> Result<serde_json::Value, FolderError
     let value: serde_json::Value =
         serde_json::from_slice(&bytes).map_err(|e| of_file(e.to_string()))?;
     let head = Head::deserialize(&value).map_err(|e| of_file(e.to_string()))?;
-    if head.format != "affine-atlas" || head.version != VERSION {
+    if head.format != "affine-atlas" || !VERSIONS.contains(&head.version) {
         return Err(FolderError::Version {
             path: path.to_owned(),
             format: head.format,

@@ -30,7 +30,7 @@ pub struct StoredPatch {
     pub packed_scale: f64,
     /// … plus this are coordinates in the packed square, v up.
     pub packed_translation: [f64; 2],
-    /// Patch coordinates to those of the central chart; `None` for rectangles.
+    /// Patch coordinates to those of the central chart; `None` for blocks.
     pub to_chart: Option<Similarity>,
 }
 

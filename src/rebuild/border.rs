@@ -88,7 +88,7 @@ fn key((uv, position): ([f64; 2], [f64; 3])) -> Key {
     [u, v, x, y, z].map(bits)
 }
 
-/// Checks the seams, and leaves those that are borders of patches: a flat patch may be slit open and have the same coordinates on both sides, a rectangle is whole.
+/// Checks the seams, and leaves those that are borders of patches: a flat patch may be slit open and have the same coordinates on both sides, a block is whole.
 pub(super) fn checked(images: &Images, frames: &[Frame]) -> Result<Vec<Seam>, RebuildError> {
     if frames.is_empty() {
         return Err(RebuildError::NoPatches);

@@ -49,7 +49,7 @@ pub struct PatchImage<'a> {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// What it is sampled over: a rectangle may lie across the cut.
+    /// What it is sampled over: a block may lie across the cut.
     pub domain: Domain,
     /// (column + ½, row + ½, 1) to patch coordinates, in either domain; see [`crate::atlas::patches::Domain::to_centres`].
     pub texel_to_patch: [[f64; 3]; 2],

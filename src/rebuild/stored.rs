@@ -57,7 +57,7 @@ pub fn rebuild_stored(folder: &ImageFolder) -> Result<Rebuilt, RebuildError> {
             .iter()
             .map(|image| {
                 let domain = match image.is_rectangle {
-                    true => Domain::Rectangle,
+                    true => Domain::Grid,
                     false => Domain::Flat,
                 };
                 PatchImage {

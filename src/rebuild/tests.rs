@@ -22,16 +22,7 @@ fn lay(s: &Sample, texels: usize) -> Laid {
         min_side: 1,
         ..PatchParams::default()
     };
-    let layout = layout(
-        &s.mesh,
-        &s.length,
-        &s.cut,
-        &s.development,
-        None,
-        Domain::Flat,
-        &params,
-    )
-    .unwrap();
+    let layout = layout(&s.mesh, &s.length, &s.cut, &s.development, None, &params).unwrap();
     let origin = image_origin(&s.mesh, &crate::geometry::frame::Frame::default());
     let images = sample(&s.mesh, &layout, &s.log_scale, origin);
     Laid {

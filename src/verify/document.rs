@@ -74,6 +74,7 @@ pub(super) struct Document {
     #[serde(default)]
     pub image_origin: Point3,
     pub flags: Flags,
+    pub grid: Option<Grid>,
     pub periods: Option<[Point2; 2]>,
 }
 
@@ -197,6 +198,41 @@ pub(super) struct Patch {
     pub height: usize,
     pub texel_to_patch: [[f64; 3]; 2],
     pub patch_to_chart: Option<Similarity>,
+    pub cells: Option<[usize; 2]>,
+    pub samples_per_cell: Option<usize>,
+    pub sides: Option<[Vec<Piece>; 4]>,
+}
+
+/// A stretch of a block's side with one neighbour.
+#[derive(Debug, Deserialize)]
+pub(super) struct Piece {
+    pub start: usize,
+    pub length: usize,
+    pub patch: Option<usize>,
+    pub side: Option<usize>,
+    pub other_start: Option<usize>,
+    pub reversed: bool,
+}
+
+impl Piece {
+    /// Patch, side and first cell there of what lies across.
+    pub fn across(&self) -> Option<(usize, usize, usize)> {
+        Some((self.patch?, self.side?, self.other_start?))
+    }
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Grid {
+    pub cells: usize,
+    pub turned_over: usize,
+    pub irregular: Vec<Irregular>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Irregular {
+    pub quad_vertex: usize,
+    pub vertex: usize,
+    pub valence: usize,
 }
 
 /// What the images hold beside position and mask.
@@ -380,7 +416,7 @@ fn stray_ids(document: &Document) -> Vec<String> {
         if !is_inside(&patch.image) {
             stray.push(format!("image {:?} outside the folder", patch.image));
         }
-        if !["flat", "rectangle", "grid"].contains(&patch.domain.as_str()) {
+        if !["flat", "grid"].contains(&patch.domain.as_str()) {
             stray.push(format!("patch {row} of domain {}", patch.domain));
         }
     }

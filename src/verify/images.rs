@@ -6,7 +6,7 @@ use super::channels;
 use super::document::{Document, Patch};
 use super::formulas::{Point2, Point3, Worst, diagonal3, distance2, mix3, norm3};
 use super::patches::Groups;
-use super::shared::{self, Sides};
+use super::sides::{self, Sides};
 use crate::read::exr::{self, Image, Read};
 use rayon::prelude::*;
 use std::path::Path;
@@ -66,8 +66,8 @@ pub(super) fn check(
                     tally.wrong_source_normal =
                         channels::wrong_source_normals(&image, &document.images, patch);
                     tally.text = check_text(image.text.as_deref(), patch, document);
-                    if patch.domain == "rectangle" {
-                        tally.sides = Some(shared::sides(&image, patch));
+                    if patch.domain == "grid" {
+                        tally.sides = Some(sides::sides(&image, patch));
                     }
                     let faces = groups.of(patch.id);
                     Raster::new(arrays, document, patch, faces, size).compare(&image, &mut tally);
@@ -79,8 +79,8 @@ pub(super) fn check(
         })
         .collect();
     report(document, &tallies, verdicts);
-    let sides: Vec<Option<Sides>> = tallies.iter_mut().map(|t| t.sides.take()).collect();
-    shared::check(arrays, document, &sides, verdicts);
+    let read: Vec<Option<Sides>> = tallies.iter_mut().map(|t| t.sides.take()).collect();
+    sides::check(document, &read, verdicts);
 }
 
 fn report(document: &Document, tallies: &[Tally], verdicts: &mut Verdicts) {
@@ -274,7 +274,7 @@ impl<'a> Raster<'a> {
         };
         let mut owner = vec![0u8; width * height];
         let mut touched = vec![false; width * height];
-        // Texels on the patch's border in a `rectangle` lie at grid corners.
+        // Texels on the border of a block lie at grid corners.
         let ends = if self.patch.domain == "flat" {
             [-0.5, width as f64 - 0.5, height as f64 - 0.5]
         } else {

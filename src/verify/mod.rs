@@ -25,13 +25,14 @@ mod formulas;
 mod glb;
 mod grid;
 mod images;
+mod lattice;
 mod metric;
 mod packed;
 mod patches;
 mod quality;
 mod seams;
 mod shapes;
-mod shared;
+mod sides;
 mod source;
 mod surface;
 mod transitions;
@@ -338,6 +339,7 @@ pub fn verify_atlas(
         images::check(folder, &arrays, &document, &groups, &mut verdicts);
         packed::check(folder, &document, &mut verdicts);
         seams::check(&surface, &arrays, &document, &groups, &mut verdicts);
+        lattice::check(folder, &surface, &arrays, &document, &mut verdicts);
     }
     glb::check(folder, &arrays, &document, &mut verdicts);
     verdicts

@@ -141,7 +141,7 @@ pub(super) fn check(
     Some(groups)
 }
 
-/// Connected and continuous across edges that are not cut; rectangles may lie across the cut, and then have the same coordinates on both sides.
+/// Connected and continuous across edges that are not cut; blocks may lie across the cut, and then have the same coordinates on both sides.
 fn check_inside(
     surface: &Surface<'_>,
     arrays: &Arrays,
@@ -239,7 +239,7 @@ fn measure(
             range = [range[0].min(scale), range[1].max(scale)];
         }
     }
-    // Rectangles and blocks of a grid are not similar to the chart.
+    // Blocks of a grid are not similar to the chart.
     let lacks_map = patch.patch_to_chart.is_none() && patch.domain == "flat";
     let flipped = faces.iter().any(|f| !is_positive(uv(*f), reach));
     let tolerance = OVERLAP_TOLERANCE * diameter;

@@ -83,8 +83,9 @@ pub enum Precision {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ImageParams {
-    /// What an image is sampled over.
-    pub domain: Domain,
+    /// What an image is sampled over; absent: a grid, unless other settings need flat patches.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub domain: Option<Domain>,
     /// What it holds beside position and mask.
     pub channels: BTreeSet<Channel>,
     /// How `normal` and `sourceNormal` are stored.
@@ -94,7 +95,7 @@ pub struct ImageParams {
 impl Default for ImageParams {
     fn default() -> Self {
         Self {
-            domain: Domain::default(),
+            domain: None,
             channels: BTreeSet::from([Channel::Normal, Channel::Face, Channel::LogScale]),
             normal_precision: Precision::default(),
         }

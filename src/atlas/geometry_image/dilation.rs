@@ -7,7 +7,7 @@
 /// row the lower envelope of the parabolas `(x − column)² + distance²`. Whole numbers throughout.
 pub(crate) fn nearest_sources(sources: &[bool], width: usize) -> Vec<usize> {
     let mut nearest: Vec<usize> = (0..sources.len()).collect();
-    // Where all are sources, as in rectangles, or none is.
+    // Where all are sources, as in blocks, or none is.
     if width == 0 || !sources.contains(&true) || !sources.contains(&false) {
         return nearest;
     }

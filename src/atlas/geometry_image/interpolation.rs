@@ -4,7 +4,7 @@ use crate::atlas::patch::{Domain, Patch};
 use crate::atlas::raster::to_texel;
 use crate::geometry::mesh::norm;
 
-/// A point of a patch in texels, such that texels are sampled at halves. The sides of a rectangle come to lie on the first and the
+/// A point of a patch in texels, such that texels are sampled at halves. The sides of a block come to lie on the first and the
 /// last column and row to the last bit.
 pub(super) fn in_texels(patch: &Patch, p: [f64; 2]) -> [f64; 2] {
     match patch.domain {
@@ -12,12 +12,6 @@ pub(super) fn in_texels(patch: &Patch, p: [f64; 2]) -> [f64; 2] {
         Domain::Grid => {
             let samples = 1.0 / patch.texel_to_patch[0][0];
             p.map(|x| x * samples.round() + 0.5)
-        }
-        Domain::Rectangle => {
-            let height = patch.texel_to_patch[1][2];
-            let last = [patch.width, patch.height].map(|n| n.saturating_sub(1) as f64);
-            let down = (height - p[1]) / height;
-            [p[0] * last[0] + 0.5, down * last[1] + 0.5]
         }
     }
 }

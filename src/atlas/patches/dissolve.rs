@@ -1,10 +1,6 @@
 //! What is left of small patches after merging, where no neighbour can take one as a whole.
 //!
-//! 1. [`dissolve`] divides a patch among several neighbours, face by face, or leaves it as it was.
-//! 2. [`widen`] lets a crumb that cannot be divided grow at its neighbours' cost, so that its image is worth
-//!    having.
-//!
-//! Every single step keeps all patches disks, injective and inside the range of log scale.
+//! [`dissolve`] divides a patch among several neighbours, face by face, or leaves it as it was. Every single step keeps all patches disks, injective and inside the range of log scale.
 
 use super::borders::{around, borders};
 use super::overlap::overlap;
@@ -17,10 +13,6 @@ use std::collections::BTreeSet;
 
 /// Patches of more faces are not divided: their neighbours would become ragged.
 const DIVIDED: usize = 600;
-/// Patches of fewer faces are crumbs …
-const CRUMB: usize = 16;
-/// … and grow up to this many.
-const GROWN: usize = 48;
 
 /// Disjoint sets of faces that cover the slit disk.
 struct Parts<'a> {
@@ -244,92 +236,4 @@ fn room(
     }
     let free = |f: &FaceId| !index.overlaps(&placement.triangle(slit, *f));
     faces.iter().copied().filter(free).collect()
-}
-
-/// Lets crumbs grow at the cost of neighbours that have plenty; `own` is scratch space, a place a copy.
-pub(super) fn widen(
-    slit: &Slit,
-    patches: Vec<Vec<FaceId>>,
-    range: f64,
-    own: &mut [[f64; 2]],
-) -> Vec<Vec<FaceId>> {
-    let mut parts = Parts::new(slit, patches, range);
-    let mut sizes: Vec<usize> = parts.faces.iter().map(Vec::len).collect();
-    for crumb in parts.by_size() {
-        if sizes[crumb as usize] >= CRUMB {
-            break;
-        }
-        grow_crumb(&mut parts, &mut sizes, crumb, own);
-    }
-    for faces in &mut parts.faces {
-        faces.clear();
-    }
-    for f in slit.connectivity.faces() {
-        parts.faces[parts.label[f] as usize].push(f);
-    }
-    parts.faces
-}
-
-fn grow_crumb(parts: &mut Parts, sizes: &mut [usize], crumb: u32, own: &mut [[f64; 2]]) {
-    let slit = parts.slit;
-    let mut faces: Vec<FaceId> = slit
-        .connectivity
-        .faces()
-        .filter(|&f| parts.label[f] == crumb)
-        .collect();
-    let Some(&root) = faces.first() else { return };
-    // All that it may come to, which is all that needs a place.
-    let mut ball: BTreeSet<FaceId> = faces.iter().copied().collect();
-    let mut ring = faces.clone();
-    for _ in 0..GROWN / 4 {
-        let next = ring.iter().flat_map(|&f| slit.neighbours(f));
-        ring = next
-            .collect::<BTreeSet<_>>()
-            .difference(&ball)
-            .copied()
-            .collect();
-        ball.extend(&ring);
-    }
-    let highest = parts.log_scale[crumb as usize][1];
-    let member = |f| ball.contains(&f);
-    let placement = place(slit, ball.iter().copied(), root, highest, member, own);
-    let middles: Vec<[f64; 2]> = faces
-        .iter()
-        .map(|&f| centroid(&placement.triangle(slit, f)))
-        .collect();
-    let n = middles.len() as f64;
-    let middle = std::array::from_fn(|i| middles.iter().map(|p| p[i] / n).sum::<f64>());
-    let key = |f: FaceId| {
-        let d = plane::distance(centroid(&placement.triangle(slit, f)), middle);
-        ((d / placement.extent * 1e7).round() as u64, f)
-    };
-    while faces.len() < GROWN {
-        let extent = Placement::new(slit, placement.positions, faces.iter().copied()).extent;
-        let is_free = |f: FaceId| {
-            let t = placement.triangle(slit, f);
-            let meets = |&g: &FaceId| overlap(&t, &placement.triangle(slit, g), TOUCHING * extent);
-            !faces.iter().any(meets)
-        };
-        let beside: BTreeSet<(u64, FaceId)> = faces
-            .iter()
-            .flat_map(|&f| slit.neighbours(f))
-            .filter(|f| parts.label[*f] != crumb && ball.contains(f))
-            .map(key)
-            .collect();
-        let taken = beside.into_iter().map(|(_, f)| f).find(|&f| {
-            // The donor stays the larger one, and no crumb itself.
-            sizes[parts.label[f] as usize] > 2 * faces.len().max(CRUMB)
-                && parts.fits(f, crumb)
-                && parts.can_take(f, crumb)
-                && parts.can_give(f)
-                && is_free(f)
-        });
-        let Some(f) = taken else { break };
-        sizes[parts.label[f] as usize] -= 1;
-        sizes[crumb as usize] += 1;
-        parts.label[f] = crumb;
-        let scale = &mut parts.log_scale[crumb as usize];
-        *scale = joined(*scale, slit.log_scale[f]);
-        faces.push(f);
-    }
 }

@@ -56,8 +56,6 @@ pub(super) struct Divider<'a> {
     /// What a shorter side may ask for on the longer one.
     enough: f64,
     params: &'a PatchParams,
-    /// Whether nothing but creases divides.
-    only_creases: bool,
 }
 
 /// Space to work in, for one patch at a time. What is not touched takes no memory.
@@ -96,7 +94,6 @@ impl<'a> Divider<'a> {
             budget: Budget::default(),
             enough: f64::INFINITY,
             params,
-            only_creases: false,
         }
     }
 
@@ -105,12 +102,6 @@ impl<'a> Divider<'a> {
         let patches = self.in_divisions(patches);
         let patches = self.unite(patches, range);
         in_order(trim(self.slit, patches, &self.bends.is_crease, range))
-    }
-
-    /// Divides patches where creases are, and nowhere else.
-    pub fn divide_along_creases(&mut self, patches: Vec<Vec<FaceId>>) -> Vec<Vec<FaceId>> {
-        self.only_creases = true;
-        in_order(self.in_divisions(patches))
     }
 
     /// Areas and bend of patches.
@@ -215,10 +206,8 @@ impl<'a> Divider<'a> {
             tried.extend(sets.components(&side));
         }
         let mut tried = vec![tried];
-        if !self.only_creases {
-            tried.extend(self.by_lines(&faces, &placement, &outline, sets));
-            tried.extend(self.by_scale(&faces, &outline, sets));
-        }
+        tried.extend(self.by_lines(&faces, &placement, &outline, sets));
+        tried.extend(self.by_scale(&faces, &outline, sets));
         let mut found: Vec<(i64, Division)> = Vec::new();
         for parts in tried {
             let division = self.in_parts(parts, now, &placement, sets);
@@ -300,7 +289,7 @@ impl<'a> Divider<'a> {
     fn outline(&self, sums: Sums, border: &[FaceId], placement: &Placement) -> Outline {
         let border = border.iter().map(|&f| placement.triangle(self.slit, f));
         let border: Vec<Triangle> = border.collect();
-        let rectangle = smallest(&border, self.params.directions());
+        let rectangle = smallest(&border);
         let sides = [rectangle.width, rectangle.width * rectangle.height];
         Outline {
             demand: Demand { sums, sides },

@@ -9,7 +9,7 @@
 use super::demand::Sums;
 use super::params::{PatchError, PatchParams};
 use super::places::with_images;
-use super::rectangle::{Directions, in_rectangle};
+use super::rectangle::in_rectangle;
 use super::seams::seams;
 use crate::atlas::cut::slit_copies;
 use crate::atlas::patch::PatchLayout;
@@ -73,7 +73,7 @@ pub fn charts_of(
             corners.iter_mut().flatten().for_each(|p| p[0] = -p[0]);
             area = -area;
         }
-        let patch = in_rectangle(&corners, area, Directions::Any);
+        let patch = in_rectangle(&corners, area);
         for (&f, &corners) in faces.iter().zip(&patch.uv) {
             face_patch[f] = PatchId::new(i);
             placed[f] = corners;
@@ -210,15 +210,7 @@ mod tests {
         let s = ramp(60, 12, 5.0);
         let params = PatchParams::default();
         let development = &s.development;
-        let ours = layout(
-            &s.mesh,
-            &s.length,
-            &s.cut,
-            development,
-            None,
-            Domain::Flat,
-            &params,
-        );
+        let ours = layout(&s.mesh, &s.length, &s.cut, development, None, &params);
         let ours = ours.unwrap();
         // Apart from each other, since all lie in [0, 1].
         let mut uv = ours.uv.clone();

@@ -23,7 +23,6 @@ mod dissolve;
 mod divide;
 mod given;
 mod holes;
-mod lattice;
 mod merge;
 mod overlap;
 mod packing;
@@ -53,19 +52,16 @@ pub use crate::atlas::patch::{
 use crate::atlas::texels::{Bend, FINER};
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, PatchId, VertexVec};
 use crate::geometry::mesh::Mesh;
-pub(crate) use bend::edge_bends;
 use demand::Sums;
 use divide::Divider;
 pub use given::charts_of;
 pub use params::{PatchError, PatchParams};
-pub(crate) use places::packed;
 use places::{Placed, images, with_images};
 use rayon::prelude::*;
 use rectangle::Oriented;
 use resolution::Raster;
 pub(crate) use seams::seams;
 use slit::Slit;
-pub(super) use slit::apex;
 #[cfg(test)]
 pub(crate) use slit::own_development_error;
 
@@ -76,8 +72,7 @@ const WIDEST_RANGE: f64 = 50.0;
 /// finds the seams.
 ///
 /// `length` holds the flat length of every edge, `development` the central chart of the disk that `cut` makes, `under`
-/// the layout that carries them, where there is one: own coordinates of patches are developed from there. `domain` is what
-/// the patches are for: images of their own, or a division into rectangles.
+/// the layout that carries them, where there is one: own coordinates of patches are developed from there.
 ///
 /// # Errors
 /// A parameter out of range, or coordinates and lengths that are not finite.
@@ -87,7 +82,6 @@ pub fn layout(
     cut: &CutGraph,
     development: &Development,
     under: Option<(&Layout, &Unfolded)>,
-    domain: Domain,
     params: &PatchParams,
 ) -> Result<PatchLayout, PatchError> {
     params.validate()?;
@@ -103,13 +97,9 @@ pub fn layout(
         }
     }
     let slit = Slit::new(mesh, length, cut, development, under);
-    let (sets, range) = segment_into(&slit, domain, params);
+    let (sets, range) = segment_into(&slit, params);
     let mut divider = Divider::new(&slit, params);
-    let sets = match domain {
-        Domain::Flat | Domain::Grid => divider.divide(sets, range),
-        // All else is decided where lines may cross faces.
-        Domain::Rectangle => divider.divide_along_creases(sets),
-    };
+    let sets = divider.divide(sets, range);
     let mut face_patch = FaceVec::filled(PatchId::new(0), c.face_count());
     let mut uv = FaceVec::filled([[0.0; 2]; 3], c.face_count());
     for (i, faces) in sets.iter().enumerate() {
@@ -117,7 +107,7 @@ pub fn layout(
     }
     let orient = |own: &mut Vec<[f64; 2]>, (i, faces): (usize, &Vec<FaceId>)| {
         let member = |f: FaceId| face_patch[f].index() == i;
-        rectangle::orient(&slit, faces, member, params.directions(), own)
+        rectangle::orient(&slit, faces, member, own)
     };
     let rows = sets.par_iter().enumerate();
     let oriented = rows.map_init(|| vec![[0.0; 2]; development.copies], orient);
@@ -136,13 +126,13 @@ pub fn layout(
         seams,
         packed: None,
     };
-    // Rectangles have rasters of their own, and the one image of all has square texels, as has a lattice.
-    (layout.patches, layout.packed) = match domain {
-        Domain::Flat if params.packed_side.is_none() && !params.shared_lattice => {
+    // The one image of all has square texels.
+    (layout.patches, layout.packed) = match params.packed_side {
+        None => {
             let rasters = rasters_by_bend(mesh, &layout, &oriented, &sums, params);
             images(&oriented, Placed::of(&oriented, rasters, params), params)
         }
-        _ => with_images(&oriented, &sums, params),
+        Some(_) => with_images(&oriented, &sums, params),
     };
     Ok(layout)
 }
@@ -176,12 +166,12 @@ fn rasters_by_bend(
 }
 
 /// The patches' faces: at most `max_count`, as far as the range of scale decides about that; and that range.
-fn segment_into(slit: &Slit, domain: Domain, params: &PatchParams) -> (Vec<Vec<FaceId>>, f64) {
+fn segment_into(slit: &Slit, params: &PatchParams) -> (Vec<Vec<FaceId>>, f64) {
     let mut range = params.log_scale_range;
-    let mut sets = segment::segment(slit, range, domain);
+    let mut sets = segment::segment(slit, range);
     while params.max_count.is_some_and(|most| sets.len() > most) && range < WIDEST_RANGE {
         range = (2.0 * range).min(WIDEST_RANGE);
-        let fewer = segment::segment(slit, range, domain);
+        let fewer = segment::segment(slit, range);
         if fewer.len() < sets.len() {
             sets = fewer;
         }

@@ -1,6 +1,5 @@
 //! What a user may choose about patches, with the defaults.
 
-use super::rectangle::Directions;
 use crate::atlas::patch::MAX_SIDE;
 
 /// Fewer texels on a side of the packed image hold no patches worth the name.
@@ -23,9 +22,6 @@ pub struct PatchParams {
     pub max_count: Option<usize>,
     /// Columns and rows of one image of all flat patches. Patches get fewer texels than the budget has where they would not fit.
     pub packed_side: Option<usize>,
-    /// Texels of all flat patches on one lattice of the central chart: square, parallel to its axes, each size a power of two times the others. Off: texels of each patch as
-    /// long and as wide as suits it.
-    pub shared_lattice: bool,
 }
 
 impl Default for PatchParams {
@@ -37,7 +33,6 @@ impl Default for PatchParams {
             padding: 2,
             max_count: None,
             packed_side: None,
-            shared_lattice: false,
         }
     }
 }
@@ -70,15 +65,6 @@ pub enum PatchError {
 }
 
 impl PatchParams {
-    /// The directions that rectangles around patches may have.
-    pub(super) fn directions(&self) -> Directions {
-        if self.shared_lattice {
-            Directions::Axes
-        } else {
-            Directions::Any
-        }
-    }
-
     /// Refuses values that no layout can have.
     pub fn validate(&self) -> Result<(), PatchError> {
         let bounds = [

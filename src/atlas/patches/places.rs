@@ -3,10 +3,10 @@
 //! *Enters:* patches in their own coordinates, with areas and bends. *Leaves:* [`Patch`]es, and the places of their images in one image of all where that is wanted.
 
 use super::demand::Sums;
+use super::packing;
 use super::params::PatchParams;
 use super::rectangle::Oriented;
 use super::resolution::{self, Raster};
-use super::{lattice, packing};
 use crate::atlas::patch::{Domain, PackedPlaces, Patch};
 
 /// Gives patches images of square texels and their places in the packed square.
@@ -129,11 +129,7 @@ fn place(patches: &[Oriented], sums: &[Sums], params: &PatchParams) -> Placed {
             texel_budget,
             ..params.clone()
         };
-        let rasters = if params.shared_lattice {
-            lattice::rasters(patches, sums, &params)
-        } else {
-            resolution::rasters(patches, sums, &params)
-        };
+        let rasters = resolution::rasters(patches, sums, &params);
         Placed::of(patches, rasters, &params)
     };
     let whole = with(params.texel_budget);
@@ -160,16 +156,8 @@ fn in_the_middle(size: &[usize; 2], content: &[f64; 2]) -> [f64; 2] {
     [0, 1].map(|i| 0.5 * (size[i] as f64 - content[i]))
 }
 
-/// Places contents (width, height) in the middle of their boxes, packed into a square: the part of the square that a unit of the
+/// For contents (width, height) that begin so far from the corners of their boxes: the part of the square that a unit of the
 /// content's width is, and where its lower left corner lies in the unit square.
-pub(crate) fn packed(sizes: &[[usize; 2]], contents: &[[f64; 2]]) -> Vec<(f64, [f64; 2])> {
-    let (corners, side) = packing::pack(sizes);
-    let lows = sizes.iter().zip(contents);
-    let lows: Vec<[f64; 2]> = lows.map(|(s, c)| in_the_middle(s, c)).collect();
-    in_square(&lows, contents, &corners, side)
-}
-
-/// The same for contents that begin so far from the corners of boxes that have their places.
 fn in_square(
     lows: &[[f64; 2]],
     contents: &[[f64; 2]],

@@ -18,15 +18,6 @@ const GOOD_LENGTHS: f64 = 1e-11;
 /// By this part of itself a side must be longer than another to be the longer one.
 const TIE: f64 = 1e-6;
 
-/// Which directions a rectangle's sides may have.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Directions {
-    /// Any: the rectangle is the smallest of all.
-    Any,
-    /// Those of the central chart's axes.
-    Axes,
-}
-
 /// A patch in its own coordinates.
 pub(super) struct Oriented {
     /// Corners of the faces, in the order of the faces given.
@@ -44,7 +35,6 @@ pub(super) fn orient(
     slit: &Slit,
     faces: &[FaceId],
     member: impl Fn(FaceId) -> bool,
-    directions: Directions,
     own: &mut [[f64; 2]],
 ) -> Oriented {
     let highest = faces.iter().map(|&f| slit.log_scale[f]);
@@ -58,11 +48,7 @@ pub(super) fn orient(
         .unwrap_or(FaceId::new(0));
     let placement = place(slit, faces.iter().copied(), root, highest, &member, own);
     let mut frame = Frame::new(slit, faces, &placement, slit.is_deep(highest));
-    if frame.own {
-        if directions == Directions::Axes {
-            frame.turn_like_chart(slit, faces);
-        }
-    } else {
+    if !frame.own {
         let error = slit.length_error(faces, placement.positions);
         if error > GOOD_LENGTHS {
             slit.develop(root, member, own);
@@ -74,7 +60,7 @@ pub(super) fn orient(
             }
         }
     }
-    frame.orient(slit, faces, directions)
+    frame.orient(slit, faces)
 }
 
 struct Frame {
@@ -90,39 +76,31 @@ impl Frame {
 
     /// Turns own coordinates so that their axes are those of the central chart.
     fn turn_like_chart(&mut self, slit: &Slit, faces: &[FaceId]) {
-        let turned = rotation(fit(slit, faces, &self.corners, 1.0, None).rotation);
+        let turned = rotation(fit(slit, faces, &self.corners, 1.0).rotation);
         for p in self.corners.iter_mut().flatten() {
             *p = turned(*p);
         }
     }
 
-    fn orient(self, slit: &Slit, faces: &[FaceId], directions: Directions) -> Oriented {
+    fn orient(self, slit: &Slit, faces: &[FaceId]) -> Oriented {
         let flat: f64 = faces.iter().map(|&f| slit.flat_area[f]).sum();
-        let mut oriented = in_rectangle(&self.corners, flat, directions);
+        let mut oriented = in_rectangle(&self.corners, flat);
         if self.own {
-            let Similarity {
-                scale, rotation, ..
-            } = oriented.to_chart;
-            // Along the axes it is known, and exact.
-            let known = (directions == Directions::Axes).then_some(rotation);
-            oriented.to_chart = fit(slit, faces, &oriented.uv, scale, known);
+            let scale = oriented.to_chart.scale;
+            oriented.to_chart = fit(slit, faces, &oriented.uv, scale);
         }
         oriented
     }
 }
 
 /// Triangles of a given total area in the coordinates of their smallest rectangle; `to_chart` leads back.
-pub(super) fn in_rectangle(
-    corners: &[[[f64; 2]; 3]],
-    area: f64,
-    directions: Directions,
-) -> Oriented {
+pub(super) fn in_rectangle(corners: &[[[f64; 2]; 3]], area: f64) -> Oriented {
     let Smallest {
         angle,
         low,
         width,
         height,
-    } = smallest(corners, directions);
+    } = smallest(corners);
     let turned = rotation(-angle);
     let to_patch = |p: [f64; 2]| {
         let q = turned(p);
@@ -153,16 +131,9 @@ pub(super) struct Smallest {
 }
 
 /// The smallest rectangle around triangles. Those on a patch's border have the same as all.
-pub(super) fn smallest(corners: &[[[f64; 2]; 3]], directions: Directions) -> Smallest {
+pub(super) fn smallest(corners: &[[[f64; 2]; 3]]) -> Smallest {
     let points = || corners.iter().flatten().copied();
-    let angle = match directions {
-        Directions::Any => best_angle(&convex_hull(outer(points))),
-        Directions::Axes => {
-            let (low, high) = extents(points());
-            let is_higher = high[1] - low[1] > (high[0] - low[0]) * (1.0 + TIE);
-            if is_higher { FRAC_PI_2 } else { 0.0 }
-        }
-    };
+    let angle = best_angle(&convex_hull(outer(points)));
     let (low, high) = extents(points().map(rotation(-angle)));
     let width = high[0] - low[0];
     // A patch without any extent keeps its coordinates.
@@ -175,15 +146,9 @@ pub(super) fn smallest(corners: &[[[f64; 2]; 3]], directions: Directions) -> Sma
     }
 }
 
-/// The similarity of known scale that takes patch coordinates nearest to the central ones, of known rotation where one is given. Where a
+/// The similarity of known scale that takes patch coordinates nearest to the central ones, where a
 /// patch is smaller than the central chart resolves, its rotation means nothing and its translation is right.
-fn fit(
-    slit: &Slit,
-    faces: &[FaceId],
-    uv: &[[[f64; 2]; 3]],
-    scale: f64,
-    known: Option<f64>,
-) -> Similarity {
+fn fit(slit: &Slit, faces: &[FaceId], uv: &[[[f64; 2]; 3]], scale: f64) -> Similarity {
     let central = |f: FaceId, k: usize| slit.development.uv[f][k];
     let pairs = || {
         let rows = faces.iter().zip(uv);
@@ -206,10 +171,9 @@ fn fit(
         dot += p[0] * q[0] + p[1] * q[1];
         cross += p[0] * q[1] - p[1] * q[0];
     }
-    let rotation = match known {
-        Some(rotation) => rotation,
-        None if dot == 0.0 && cross == 0.0 => 0.0,
-        None => wrap_angle(cross.atan2(dot)),
+    let rotation = match (dot, cross) {
+        (0.0, 0.0) => 0.0,
+        _ => wrap_angle(cross.atan2(dot)),
     };
     let turned = rotate(from, rotation);
     Similarity {

@@ -8,7 +8,7 @@
 //!    the largest hole, until there is none. (The sheet itself makes no holes: an immersed disk whose
 //!    border is a simple curve is embedded, so what a patch surrounds in the plane belongs to it.)
 //! 4. Merge neighbours while all three conditions hold, smallest first (`merge`); divide small patches
-//!    among their neighbours where none can take them whole; what is still tiny and is to become rectangles grows (`dissolve`).
+//!    among their neighbours where none can take them whole; see `dissolve`.
 //!
 //! Everything that is compared is rounded first and ties go to the lower id, so that a change in the
 //! last digits of the metric does not change the patches.
@@ -21,7 +21,6 @@ use super::overlap::Triangle;
 use super::placement::{Placement, centroid, place, rounded_ln};
 use super::sets::{Sets, in_order, partition};
 use super::slit::Slit;
-use crate::atlas::patch::Domain;
 use crate::geometry::ids::FaceId;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -34,7 +33,7 @@ const GROWTH: f64 = 0.9;
 const ROUNDS: usize = 3;
 
 /// Divides the slit disk; every face is in exactly one set. `range` bounds the regional log scale of each.
-pub(super) fn segment(slit: &Slit, range: f64, domain: Domain) -> Vec<Vec<FaceId>> {
+pub(super) fn segment(slit: &Slit, range: f64) -> Vec<Vec<FaceId>> {
     let mut sets = Sets::new(slit);
     let total: f64 = slit.source_area.iter().sum();
     let mut own = vec![[0.0; 2]; slit.development.copies];
@@ -93,10 +92,7 @@ pub(super) fn segment(slit: &Slit, range: f64, domain: Domain) -> Vec<Vec<FaceId
         }
     }
     // A small flat image costs less than the ragged border that a crumb leaves in its neighbours.
-    in_order(match domain {
-        Domain::Flat | Domain::Grid => patches,
-        Domain::Rectangle => widen(slit, patches, range, &mut own),
-    })
+    in_order(patches)
 }
 
 /// Covers a connected region by disks, each injective at its own extent, and puts what is left over into `rest`.

@@ -317,7 +317,7 @@ impl Disk<'_> {
 }
 
 /// The third corner of a triangle, left of `a` and `b`, from the lengths ab, bc and ca.
-pub(in crate::atlas) fn apex(a: [f64; 2], b: [f64; 2], [l_ab, l_bc, l_ca]: [f64; 3]) -> [f64; 2] {
+fn apex(a: [f64; 2], b: [f64; 2], [l_ab, l_bc, l_ca]: [f64; 3]) -> [f64; 2] {
     let along = 0.5 * (l_ab + (l_ca - l_bc) * (l_ca + l_bc) / l_ab);
     let height = 2.0 * flat_area([l_ab, l_bc, l_ca]) / l_ab;
     let d = plane::distance(a, b);

@@ -42,16 +42,7 @@ struct Checked {
 
 /// Lays out and samples, and checks everything that holds for every input.
 fn check(s: &Sample, params: &PatchParams) -> Checked {
-    let layout = layout(
-        &s.mesh,
-        &s.length,
-        &s.cut,
-        &s.development,
-        None,
-        Domain::Flat,
-        params,
-    )
-    .unwrap();
+    let layout = layout(&s.mesh, &s.length, &s.cut, &s.development, None, params).unwrap();
     let images = sample(
         &s.mesh,
         &layout,
@@ -563,16 +554,7 @@ fn units_and_last_digits_change_nothing() {
     ];
     for make in make {
         let run = |s: &Sample| {
-            layout(
-                &s.mesh,
-                &s.length,
-                &s.cut,
-                &s.development,
-                None,
-                Domain::Flat,
-                &params(),
-            )
-            .unwrap()
+            layout(&s.mesh, &s.length, &s.cut, &s.development, None, &params()).unwrap()
         };
         let reference = run(&make());
         for scale in [1.0, 1e-3, 1e3, 1e6] {
@@ -596,17 +578,8 @@ fn units_and_last_digits_change_nothing() {
 #[test]
 fn bad_parameters_and_numbers_are_refused() {
     let mut s = square(2);
-    let run = |s: &Sample, p: &PatchParams| {
-        layout(
-            &s.mesh,
-            &s.length,
-            &s.cut,
-            &s.development,
-            None,
-            Domain::Flat,
-            p,
-        )
-    };
+    let run =
+        |s: &Sample, p: &PatchParams| layout(&s.mesh, &s.length, &s.cut, &s.development, None, p);
     for bad in [
         PatchParams {
             log_scale_range: f64::NAN,

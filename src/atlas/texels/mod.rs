@@ -2,7 +2,6 @@
 //!
 //! *Enters:* images of about even texels. *Leaves:* columns and rows for which the squared distance between the surface and the images is least.
 //! Each image shows how the surface bends in it ([`bend`]), along its columns and along its rows; with that the numbers follow ([`shares`]).
-//! Flat patches and rectangles have their numbers from here: those of a patch are its own, rectangles in a strip share them.
 
 mod bend;
 mod shares;

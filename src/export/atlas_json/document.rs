@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Version of the output contract that this module writes.
-pub const FORMAT_VERSION: u32 = 1;
+pub const FORMAT_VERSION: u32 = 2;
 
 /// The whole document.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -52,6 +52,9 @@ pub struct Document {
     /// The integer grid; absent where patches are no blocks of one.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub grid: Option<Grid>,
+    /// Why there is none, where one was asked for.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub no_grid: Option<String>,
     /// Domains of the geometry images.
     pub patches: Vec<Patch>,
     /// What the images hold; absent where that is normal, face and log scale, all of 32 bits, and no image of all patches is there.
@@ -320,7 +323,7 @@ pub struct Patch {
     /// Of a block: what lies across its bottom, right, top and left.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub sides: Option<[Vec<SidePiece>; 4]>,
-    /// Patch coordinates to central-chart coordinates; null for a rectangle.
+    /// Patch coordinates to central-chart coordinates; null for a block of a grid.
     pub patch_to_chart: Option<Similarity>,
     /// Patch coordinates to the unit square of `surface.glb`, v up.
     pub patch_to_packed: Packing,

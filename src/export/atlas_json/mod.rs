@@ -78,6 +78,7 @@ pub fn describe(atlas: &AffineAtlas, provenance: &Provenance) -> Result<Document
         transitions: transitions(atlas),
         periods: periods::period_vectors(atlas),
         grid: atlas.grid.as_ref().map(grid::grid),
+        no_grid: atlas.no_grid.clone(),
         patches: patches(atlas),
         images: images(atlas),
         quality: atlas.quality,

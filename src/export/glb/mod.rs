@@ -139,7 +139,7 @@ fn rectangle(patch: &Patch) -> [f64; 4] {
     // A texel reaches half its size from where it is sampled.
     let first = match patch.domain {
         Domain::Flat => 0.0,
-        Domain::Rectangle | Domain::Grid => -0.5,
+        Domain::Grid => -0.5,
     };
     let [left, top] = packed(first, first);
     let [right, bottom] = packed(first + patch.width as f64, first + patch.height as f64);

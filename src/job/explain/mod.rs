@@ -13,6 +13,7 @@ mod turns;
 use super::flatten::{Flattened, flatten, prescribed};
 use super::listing::counted;
 use super::{BuildError, Requests, cones, read, repair};
+use crate::atlas::patch::Domain;
 use crate::config::Config;
 use crate::export::ExportError;
 use crate::export::glb::marked::{self, Marked};
@@ -74,6 +75,8 @@ impl fmt::Display for Explanation {
 /// # Errors
 /// A file that cannot be read: then there is no surface to show.
 pub fn mesh(path: &Path, config: &Config) -> Result<Explanation, BuildError> {
+    let config = &config.clone().resolved()?;
+    let otherwise = &config.on_flat_patches();
     let asset = read::read(path, &config.limits)?;
     let soup = &asset.soup;
     let mut explanation = Explanation::default();
@@ -94,16 +97,18 @@ pub fn mesh(path: &Path, config: &Config) -> Result<Explanation, BuildError> {
     if !repaired.log.is_empty() {
         explanation.say("", failure::repairs(&repaired.log));
     }
-    let requests = match cones::assign(&repaired, &config.cones, &config.boundary, &config.features)
-    {
-        Ok(requests) => requests,
+    let assigned = |c: &Config| cones::assign(&repaired, &c.cones, &c.boundary, &c.features);
+    let both = assigned(config).and_then(|own| Ok((own, assigned(otherwise)?)));
+    let (requests, of_flat) = match both {
+        Ok(both) => both,
         Err(error) => {
             explanation.refuse("", "mesh".into(), &error.into(), soup);
             return Ok(explanation);
         }
     };
     let count = repaired.components.len();
-    for (i, (component, requests)) in repaired.components.into_iter().zip(requests).enumerate() {
+    let parts = repaired.components.into_iter().zip(requests).zip(of_flat);
+    for (i, ((component, requests), of_flat)) in parts.enumerate() {
         let name = format!("component {i}");
         let indent = match count {
             1 => "",
@@ -112,7 +117,16 @@ pub fn mesh(path: &Path, config: &Config) -> Result<Explanation, BuildError> {
                 "  "
             }
         };
-        match flat(component, &requests, config) {
+        let flattened = match config.domain() {
+            Domain::Flat => flat(component, &requests, config),
+            // As a build does.
+            Domain::Grid => flat(component.clone(), &requests, config).or_else(|error| {
+                let flattened = flat(component, &of_flat, otherwise)?;
+                explanation.say(indent, vec![format!("no grid: {error}")]);
+                Ok(flattened)
+            }),
+        };
+        match flattened {
             Ok((flat, turns)) => {
                 let (lines, surface) = flat.explain(name);
                 explanation.say(indent, lines);

@@ -19,6 +19,7 @@ pub use suggestion::Suggestion;
 
 use super::flatten::{flatten, prescribed};
 use super::{BuildError, Observed};
+use crate::atlas::patch::Domain;
 use crate::config::Config;
 use crate::flow::cones::{
     self, Cone, ConeParams, ConeSpec, ConeStrategy, PiMultiple, Prescription, Requests,
@@ -114,6 +115,7 @@ pub fn survey(
     observer: &dyn Observer,
 ) -> Result<Vec<ComponentSurvey>, BuildError> {
     observer.stage("repair", 0, 1);
+    let config = &for_survey(config)?;
     let repaired = repair::repair(soup, &config.repair)?;
     // What is wrong with the configuration is said once, not in every row.
     let automatic = with_cones(config, ConeStrategy::Auto, COMPARED);
@@ -129,6 +131,15 @@ pub fn survey(
         task.component(counts)
     });
     surveyed.collect()
+}
+
+/// The configuration of flat patches: the cones of a grid are those of its field.
+fn for_survey(config: &Config) -> Result<Config, BuildError> {
+    let config = config.clone().resolved()?;
+    Ok(match config.domain() {
+        Domain::Flat => config,
+        Domain::Grid => config.on_flat_patches(),
+    })
 }
 
 /// The same configuration with other cones; how the automatic choice shall choose stays.

@@ -18,7 +18,6 @@ fn sampled(sample: &Sample, source: &Mesh, channels: &[Channel]) -> Vec<Geometry
         &sample.cut,
         &sample.development,
         None,
-        crate::atlas::patches::Domain::Flat,
         &PatchParams::default(),
     )
     .unwrap();

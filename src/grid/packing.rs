@@ -1,0 +1,330 @@
+//! Islands of cells in a square: each goes to the lowest place where it fits, then the leftmost, turned by a quarter or not.
+//!
+//! Islands are drawn on a raster as wide as a gutter, each with its gutter; a row of the square is a row of bits, and all places in it are tried at once. Several widths of the square and two orders of the islands are tried. Whole
+//! numbers, so the result is the same everywhere.
+
+use rayon::prelude::*;
+
+/// Squares of the raster along a side of the square, about, at most.
+const FINEST: usize = 512;
+/// Widths that are tried: the side of a square without gaps, and so many twenty-fifths more.
+const WIDTHS: usize = 10;
+/// More islands are packed once.
+const MANY: usize = 400;
+
+/// An island to be packed.
+pub(super) struct Outline {
+    /// Cells of the rectangle around it.
+    pub size: [usize; 2],
+    /// Its cells there.
+    pub cells: Vec<[usize; 2]>,
+}
+
+/// Where islands are.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Packed {
+    /// Texel at the lower left corner of the rectangle around each island.
+    pub corner: Vec<[usize; 2]>,
+    /// Whether it was turned by a quarter, counterclockwise.
+    pub is_turned: Vec<bool>,
+    /// Texels on a side of the square.
+    pub side: usize,
+}
+
+/// An island on the raster: the columns of each of its rows, from the first to before the last.
+struct Mask {
+    size: [usize; 2],
+    runs: Vec<Vec<[usize; 2]>>,
+}
+
+impl Mask {
+    fn new(outline: &Outline, is_turned: bool, samples: usize, gutter: usize, unit: usize) -> Self {
+        let [w, h] = outline.size;
+        let span = |n: usize| {
+            [
+                n * samples / unit,
+                (n * samples + samples + gutter).div_ceil(unit),
+            ]
+        };
+        let size = match is_turned {
+            true => [h, w],
+            false => [w, h],
+        };
+        let size = size.map(|n| span(n.max(1) - 1)[1]);
+        let mut is_set = vec![false; size[0] * size[1]];
+        for &[x, y] in &outline.cells {
+            let [x, y] = match is_turned {
+                true => [h - 1 - y, x],
+                false => [x, y],
+            };
+            let ([left, right], [low, high]) = (span(x), span(y));
+            for row in low..high {
+                is_set[row * size[0] + left..row * size[0] + right].fill(true);
+            }
+        }
+        let runs = is_set.chunks(size[0]).map(|row| {
+            let mut runs = Vec::new();
+            let mut x = 0;
+            while x < row.len() {
+                let from = x;
+                while x < row.len() && row[x] {
+                    x += 1;
+                }
+                if x > from {
+                    runs.push([from, x]);
+                }
+                x += 1;
+            }
+            runs
+        });
+        Self {
+            size,
+            runs: runs.collect(),
+        }
+    }
+}
+
+/// Rows of bits, 64 a word.
+struct Rows {
+    words: usize,
+    bits: Vec<u64>,
+}
+
+impl Rows {
+    fn row(&self, y: usize) -> Option<&[u64]> {
+        self.bits.get(y * self.words..(y + 1) * self.words)
+    }
+
+    fn set(&mut self, y: usize, [from, to]: [usize; 2]) {
+        let needed = (y + 1) * self.words;
+        if self.bits.len() < needed {
+            self.bits.resize(needed, 0);
+        }
+        for x in from..to {
+            self.bits[y * self.words + x / 64] |= 1 << (x % 64);
+        }
+    }
+}
+
+/// Ors a row, moved to lower places by `by`, into another one.
+fn or_moved(into: &mut [u64], row: &[u64], by: usize) {
+    let (words, bits) = (by / 64, by % 64);
+    for i in 0..into.len().saturating_sub(words) {
+        let low = row[i + words] >> bits;
+        let high = match (bits, row.get(i + words + 1)) {
+            (0, _) | (_, None) => 0,
+            (_, Some(next)) => next << (64 - bits),
+        };
+        into[i] |= low | high;
+    }
+}
+
+/// The lowest, then leftmost place of a mask in a square of this width, where nothing is higher than what is taken.
+fn place(taken: &Rows, mask: &Mask, width: usize, below: usize) -> Option<[usize; 2]> {
+    let last = width.checked_sub(mask.size[0])?;
+    let mut blocked = vec![0u64; taken.words];
+    let (mut spread, mut next) = (blocked.clone(), blocked.clone());
+    for y in 0..=below {
+        blocked.fill(0);
+        for (r, runs) in mask.runs.iter().enumerate() {
+            let Some(row) = taken.row(y + r) else { break };
+            for &[from, to] in runs {
+                // Where any of the places from … to − 1 on is taken.
+                let mut reach = 1;
+                spread.copy_from_slice(row);
+                while reach < to - from {
+                    let by = reach.min(to - from - reach);
+                    next.copy_from_slice(&spread);
+                    or_moved(&mut next, &spread, by);
+                    std::mem::swap(&mut spread, &mut next);
+                    reach += by;
+                }
+                or_moved(&mut blocked, &spread, from);
+            }
+        }
+        let free = |x: &usize| blocked[x / 64] >> (x % 64) & 1 == 0;
+        if let Some(x) = (0..=last).find(free) {
+            return Some([x, y]);
+        }
+    }
+    None
+}
+
+/// Packs into a strip of the given width; the height comes last.
+fn strip(masks: &[[Mask; 2]], order: &[usize], width: usize) -> (Vec<([usize; 2], bool)>, usize) {
+    let mut places = vec![([0; 2], false); masks.len()];
+    let mut taken = Rows {
+        words: width.div_ceil(64) + 1,
+        bits: Vec::new(),
+    };
+    let mut height = 0;
+    for &i in order {
+        let found = [false, true].into_iter().filter_map(|is_turned| {
+            let mask = &masks[i][usize::from(is_turned)];
+            let [x, y] = place(&taken, mask, width, height)?;
+            Some(((y + mask.size[1], y, x), is_turned))
+        });
+        // Every island fits into the strip lying down, above all that is taken.
+        let Some(((top, y, x), is_turned)) = found.min() else {
+            continue;
+        };
+        for (r, runs) in masks[i][usize::from(is_turned)].runs.iter().enumerate() {
+            runs.iter()
+                .for_each(|&[from, to]| taken.set(y + r, [x + from, x + to]));
+        }
+        places[i] = ([x, y], is_turned);
+        height = height.max(top);
+    }
+    (places, height)
+}
+
+/// Packs islands whose cells are `samples` texels wide, with so many texels around each.
+pub(super) fn pack(outlines: &[Outline], samples: usize, gutter: usize) -> Packed {
+    let cells: usize = outlines.iter().map(|o| o.cells.len()).sum();
+    let gap = 2 * gutter;
+    let texels = (cells as f64).sqrt() * samples as f64;
+    let unit = gap.max(1).max((texels / FINEST as f64).ceil() as usize);
+    // As many squares of the raster to a cell as there can be without gaps.
+    let unit = (1..=unit)
+        .rev()
+        .find(|u| samples.is_multiple_of(*u) && u * 4 > unit)
+        .unwrap_or(unit);
+    let mask =
+        |o: &Outline| [false, true].map(|is_turned| Mask::new(o, is_turned, samples, gap, unit));
+    let masks: Vec<[Mask; 2]> = outlines.par_iter().map(mask).collect();
+    let area = |i: usize| -> usize {
+        let runs = masks[i][0].runs.iter().flatten();
+        runs.map(|[from, to]| to - from).sum()
+    };
+    let total: usize = (0..masks.len()).map(area).sum();
+    let root = (total as f64).sqrt();
+    // The shorter side of the widest, so that all fit, turned or not.
+    let widest = masks
+        .iter()
+        .map(|m| m[0].size[0].min(m[0].size[1]))
+        .max()
+        .unwrap_or(1);
+    let by = |key: &dyn Fn(usize) -> usize| {
+        let mut order: Vec<usize> = (0..masks.len()).collect();
+        order.sort_by_key(|&i| (std::cmp::Reverse(key(i)), i));
+        order
+    };
+    let orders = [
+        by(&|i| masks[i][0].size[0].max(masks[i][0].size[1])),
+        by(&area),
+    ];
+    let tries = if masks.len() > MANY { 1 } else { WIDTHS };
+    let jobs: Vec<(usize, usize)> = (0..orders.len())
+        .flat_map(|o| (0..tries).map(move |w| (o, w)))
+        .collect();
+    let of = |&(o, w): &(usize, usize)| {
+        let width = (root * (1.0 + 0.04 * w as f64)).ceil() as usize;
+        let width = width.max(widest);
+        let (places, height) = strip(&masks, &orders[o], width);
+        let reach = places.iter().zip(&masks);
+        let reach = reach
+            .map(|(([x, _], t), m)| x + m[usize::from(*t)].size[0])
+            .max();
+        (reach.unwrap_or(1).max(height), places)
+    };
+    let tried: Vec<(usize, Vec<([usize; 2], bool)>)> = jobs.par_iter().map(of).collect();
+    let best = tried.into_iter().min_by_key(|(side, _)| *side);
+    let (side, places) = best.unwrap_or_default();
+    Packed {
+        corner: places
+            .iter()
+            .map(|(at, _)| at.map(|n| n * unit + gutter))
+            .collect(),
+        is_turned: places.iter().map(|(_, is_turned)| *is_turned).collect(),
+        side: side.max(1) * unit,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outline(rows: &[&str]) -> Outline {
+        let mut cells = Vec::new();
+        for (y, row) in rows.iter().rev().enumerate() {
+            cells.extend(
+                row.bytes()
+                    .enumerate()
+                    .filter(|(_, b)| *b == b'#')
+                    .map(|(x, _)| [x, y]),
+            );
+        }
+        Outline {
+            size: [rows[0].len(), rows.len()],
+            cells,
+        }
+    }
+
+    /// Texels that islands take with their gutters, each by one.
+    fn overlaps(outlines: &[Outline], packed: &Packed, samples: usize, gutter: usize) -> bool {
+        let mut taken = vec![0; packed.side * packed.side];
+        for (i, o) in outlines.iter().enumerate() {
+            let mut own = std::collections::BTreeSet::new();
+            for &[x, y] in &o.cells {
+                let [x, y] = match packed.is_turned[i] {
+                    true => [o.size[1] - 1 - y, x],
+                    false => [x, y],
+                };
+                let [left, low] = [0, 1].map(|k| packed.corner[i][k] + [x, y][k] * samples);
+                for v in low - gutter..low + samples + gutter {
+                    own.extend(
+                        (left - gutter..left + samples + gutter).map(|u| v * packed.side + u),
+                    );
+                }
+            }
+            own.into_iter().for_each(|at: usize| taken[at] += 1);
+        }
+        taken.iter().any(|&n| n > 1)
+    }
+
+    #[test]
+    fn islands_interlock_and_keep_their_gutters() {
+        let outlines = [
+            outline(&["###.", "#...", "#..."]),
+            outline(&["#####"]),
+            outline(&["##", "##"]),
+            outline(&["..#", "..#", "###"]),
+            outline(&["#"]),
+        ];
+        for (samples, gutter) in [(8, 2), (4, 1), (8, 0), (5, 3), (1, 2), (64, 2)] {
+            let packed = pack(&outlines, samples, gutter);
+            assert!(
+                !overlaps(&outlines, &packed, samples, gutter),
+                "{samples} {gutter}"
+            );
+            let cells: usize = outlines.iter().map(|o| o.cells.len()).sum();
+            let filled = (cells * samples * samples) as f64 / (packed.side * packed.side) as f64;
+            assert!(samples < 8 || gutter > 0 || filled > 0.6, "{filled}");
+        }
+        assert_eq!(pack(&[], 8, 2).corner.len(), 0);
+    }
+
+    #[test]
+    fn many_rectangles_fill_the_square() {
+        let mut state = 5u64;
+        let mut random = |n: u64| {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(99);
+            ((state >> 33) % n) as usize + 1
+        };
+        let outlines: Vec<Outline> = (0..60)
+            .map(|_| {
+                let size = [random(9), random(6)];
+                let cells = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| [x, y]));
+                Outline {
+                    size,
+                    cells: cells.collect(),
+                }
+            })
+            .collect();
+        let packed = pack(&outlines, 16, 1);
+        assert!(!overlaps(&outlines, &packed, 16, 1));
+        let cells: usize = outlines.iter().map(|o| o.cells.len()).sum();
+        let filled = (cells * 256) as f64 / (packed.side * packed.side) as f64;
+        assert!(filled > 0.75, "{filled}");
+    }
+}

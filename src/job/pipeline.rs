@@ -1,0 +1,185 @@
+//! From a component to its atlas: all stages, each with what the ones before it made.
+
+use super::BuildError;
+use super::flatten::{Flattened, flatten, prescribed};
+use crate::atlas::charted::Charted;
+use crate::atlas::develop::Development;
+use crate::atlas::geometry_image::SourceSurface;
+use crate::atlas::patches::Domain;
+use crate::atlas::{axes, charts, develop, geometry_image, patches};
+use crate::config::Config;
+use crate::flow::cones::Requests;
+use crate::geometry::deviation::{Triangles, distances};
+use crate::grid;
+use crate::observe::Observer;
+use crate::product::AffineAtlas;
+use crate::rebuild::Images;
+use crate::repair::Component;
+use crate::report;
+
+/// An atlas of a component: on a grid, where that is asked for and can be made, else of flat patches. `requests` are those of
+/// [`Config::on_flat_patches`] in the second place. `enter` is told each stage's name before it begins, and may stop the job.
+pub(super) fn build_component(
+    component: Component,
+    [requests, otherwise]: [Requests; 2],
+    config: &Config,
+    observer: &dyn Observer,
+    enter: impl Fn(&'static str) -> Result<(), BuildError>,
+) -> Result<AffineAtlas, BuildError> {
+    if config.domain() == Domain::Flat || component.mesh.is_err() {
+        return pipeline(component, &requests, config, None, observer, &enter);
+    }
+    let again = component.clone();
+    match pipeline(component, &requests, config, None, observer, &enter) {
+        Err(BuildError::Cancelled) => Err(BuildError::Cancelled),
+        Err(error) => {
+            let (config, reason) = (config.on_flat_patches(), error.to_string());
+            pipeline(again, &otherwise, &config, Some(reason), observer, &enter)
+        }
+        built => built,
+    }
+}
+
+/// The pipeline. `no_grid` says why there is none where one was wanted.
+fn pipeline(
+    component: Component,
+    requests: &Requests,
+    config: &Config,
+    no_grid: Option<String>,
+    observer: &dyn Observer,
+    enter: &impl Fn(&'static str) -> Result<(), BuildError>,
+) -> Result<AffineAtlas, BuildError> {
+    enter("cones")?;
+    let frame = component.frame;
+    let mesh = component.mesh?;
+    let prescription = prescribed(&mesh, requests, config)?;
+    let (given, given_faces) = (mesh.positions.clone(), mesh.connectivity.to_faces());
+    let source = SourceSurface::of(&mesh, &config.images);
+    let Flattened {
+        mesh,
+        metric,
+        prescription,
+        layout,
+        layout_cut,
+        cut,
+        connectivity_repair,
+    } = flatten(mesh, prescription, config, observer, enter)?;
+    let c = &mesh.connectivity;
+    enter("charts")?;
+    let mut unfolded = develop::develop(&layout, layout_cut)?;
+    let mut central = Development::place(c, &cut, &layout, &unfolded);
+    if let Some(met) = &metric.quarter_turns {
+        let axis = axes::axis(&mesh, &cut, &central, &met.lines);
+        unfolded.turn(-axis);
+        central.turn(-axis);
+    }
+    let mut charts = charts::chart(c, &cut, &central, &layout, &unfolded, &prescription)?;
+    if metric.quarter_turns.is_some() {
+        charts.turn_like_central();
+    }
+    let surface = Charted {
+        mesh,
+        metric,
+        prescription,
+        cut,
+        central,
+        charts,
+    };
+    let in_patches = |surface: &Charted| {
+        enter("patches")?;
+        let under = Some((&layout, &unfolded));
+        let layout = patches::layout(
+            &surface.mesh,
+            &surface.metric.length,
+            &surface.cut,
+            &surface.central,
+            under,
+            &config.patches,
+        );
+        layout.map_err(BuildError::from)
+    };
+    let (surface, patches, grid, no_grid) = match config.domain() {
+        Domain::Flat => {
+            let patches = in_patches(&surface)?;
+            (surface, patches, None, no_grid)
+        }
+        Domain::Grid => {
+            enter("grid")?;
+            match grid::grid(surface, &config.grid, &config.patches) {
+                Ok((surface, patches, grid)) => (surface, patches, Some(grid), None),
+                Err(refused) => {
+                    let (surface, error) = *refused;
+                    let patches = in_patches(&surface)?;
+                    (surface, patches, None, Some(error.to_string()))
+                }
+            }
+        }
+    };
+    let Charted {
+        mesh,
+        metric,
+        prescription,
+        cut,
+        central,
+        charts,
+    } = surface;
+    enter("images")?;
+    let image_origin = geometry_image::image_origin(&mesh, &frame);
+    let origin = frame.enter(image_origin);
+    let images = geometry_image::sample(&mesh, &patches, &metric.log_scale, origin);
+    let images = match &source {
+        Some(source) => geometry_image::sample_attributes(&mesh, &patches, images, source),
+        None => images,
+    };
+    let mut images = images;
+    if let Some(grid) = &grid {
+        grid.unite(&mut images);
+    }
+    enter("report")?;
+    let topology = mesh.connectivity.topology();
+    let quality = report::measure(&mesh, &metric, &cut, &central, &charts, &prescription);
+    let given = Triangles {
+        positions: given.as_slice(),
+        faces: &given_faces,
+    };
+    let readable = Images::new(&patches, &images, origin);
+    let (quality, rebuilt) = report::measure_images(
+        quality,
+        given,
+        &readable,
+        topology,
+        config.patches.texel_budget,
+    );
+    let image_distance = rebuilt
+        .filter(|_| config.report.enabled)
+        .and_then(|rebuilt| {
+            let rebuilt = Triangles {
+                positions: &rebuilt.positions,
+                faces: &rebuilt.faces,
+            };
+            distances(mesh.positions.as_slice(), rebuilt)
+        });
+    let atlas = AffineAtlas {
+        topology,
+        seamless: report::is_seamless(&charts),
+        repair: component.log.counts(),
+        repair_log: component.log,
+        image_distance: image_distance.map(Into::into),
+        flow: config.flow.clone(),
+        mesh,
+        prescription,
+        metric,
+        cut,
+        central,
+        charts,
+        patches,
+        grid,
+        no_grid,
+        images,
+        image_params: config.images.clone(),
+        image_origin,
+        connectivity_repair,
+        quality,
+    };
+    Ok(atlas.leave(&frame))
+}

@@ -1,0 +1,44 @@
+//! What a build says about an atlas beside that it is there.
+
+use crate::config::Config;
+use crate::product::AffineAtlas;
+
+/// What was asked for and could not be had, and much distortion, beginning with a verb.
+pub(super) fn warnings(atlas: &AffineAtlas, config: &Config) -> Vec<String> {
+    let mut notes = Vec::new();
+    let (quality, most) = (&atlas.quality, config.report.distortion_warning);
+    if quality.log_scale.std > most {
+        notes.push(format!(
+            "is drawn unevenly: the log scale deviates by {:.2} (report.distortion_warning = {most}), area distortion (9) is {:.2}; more cones help (`affine-atlas cones` shows how much), `affine-atlas explain` shows where",
+            quality.log_scale.std, quality.area_distortion
+        ));
+    }
+    if let Some(met) = &atlas.metric.quarter_turns
+        && !met.given_up.is_empty()
+    {
+        let all = met.lines.len() + met.given_up.len();
+        notes.push(format!(
+            "has {} of {all} features as lines: the others cannot be lines with these, or only in faces without width; atlas.json names them, and a larger features.angle asks for fewer",
+            met.lines.len()
+        ));
+    }
+    if let Some(reason) = &atlas.no_grid {
+        notes.push(format!("has flat patches instead of a grid: {reason}"));
+    }
+    let params = &config.patches;
+    let count = atlas.patches.patches.len();
+    if let Some(most) = params.max_count.filter(|&most| count > most) {
+        notes.push(format!(
+            "has {count} patches, more than the {most} of patches.max_count: with fewer, patches would overlap"
+        ));
+    }
+    let side = atlas.patches.packed.as_ref().map(|packed| packed.side);
+    if let (Some(most), Some(side)) = (params.packed_side, side)
+        && side > most
+    {
+        notes.push(format!(
+            "needs a packed image of {side} by {side} texels, more than the {most} of patches.packed_side: each of its {count} patches has at least patches.min_side texels"
+        ));
+    }
+    notes
+}
