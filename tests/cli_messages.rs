@@ -272,20 +272,17 @@ fn unknown_preset() {
 }
 
 #[test]
-fn rectangles_on_a_lattice() {
-    let text = "[patches]\nshared_lattice = true\n[images]\ndomain = \"rectangle\"\n";
-    insta::assert_snapshot!(config_refusal(text), @r#"
-     error: `patches.shared_lattice` is for flat images, but `images.domain` is "rectangle"
-     help: set `images.domain = "flat"`, or leave `patches.shared_lattice` out
-    "#);
+fn rectangles() {
+    let text = "[images]\ndomain = \"rectangle\"\n";
+    insta::assert_snapshot!(config_refusal(text), @"");
 }
 
 #[test]
-fn packed_rectangles() {
-    let text = "preset = \"omage-1024\"\n[images]\ndomain = \"rectangle\"\n";
+fn packed_blocks() {
+    let text = "preset = \"omage-1024\"\n[images]\ndomain = \"grid\"\n";
     insta::assert_snapshot!(config_refusal(text), @r#"
-     error: `patches.packed_side` packs flat images into one, but `images.domain` is "rectangle"
-     help: set `images.domain = "flat"`, or leave `patches.packed_side` out
+     error: `patches.texel_budget` is for flat patches, but `images.domain` is "grid"
+     help: leave `patches.texel_budget` out, or set `images.domain = "flat"`
     "#);
 }
 

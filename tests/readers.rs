@@ -17,8 +17,8 @@ const FIXTURE: &str = "fixtures/good/genus-0-animal.ply";
 fn main() {
     let arguments = Arguments::from_args();
     let cases = [
-        ("default", "images.domain=flat"),
-        ("rectangle", "images.domain=rectangle"),
+        ("default", "images.domain=grid"),
+        ("flat", "images.domain=flat"),
         ("half", "images.normal_precision=half"),
         ("packed", "patches.packed_side=512"),
     ];

@@ -2,7 +2,7 @@
 //! rate that exact sampling gives. (Whether those of default builds are watertight is asked in `corpus`, which has them.)
 //!
 //! `AFFINE_ATLAS_CORPUS` names a folder with the models; without it every case is reported as ignored. `AFFINE_ATLAS_CHECKER` names an
-//! independent checker, which is asked about rectangles and texels on a lattice. Large models are for `--ignored`.
+//! independent checker, which is asked about grids. Large models are for `--ignored`.
 
 mod real_models;
 
@@ -22,7 +22,7 @@ use real_models::{CLEAN, LARGE, checked, comparable};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-/// Side of the budget of rectangles, whose walls depend on it, and of texels on a lattice.
+/// Side of the square of as many texels as grids have.
 const CHECKED: usize = 256;
 
 /// What images are sampled over.
@@ -30,9 +30,8 @@ const CHECKED: usize = 256;
 enum Texels {
     /// Patches of the flat metric, each with texels of its own.
     Flat,
-    /// Patches of the flat metric with texels on one lattice.
-    Lattice,
-    Rectangle,
+    /// Blocks of a grid.
+    Grid,
 }
 
 /// Models whose faces are far smaller than the largest texels and far larger than the smallest.
@@ -64,8 +63,7 @@ fn main() {
     for (file, genus, loops) in CLEAN {
         // At 512², the default, the atlases of `corpus` are asked.
         let flat = [256, 64].map(|side| (Texels::Flat, side));
-        let others = [(Texels::Rectangle, CHECKED), (Texels::Lattice, CHECKED)];
-        for (texels, side) in flat.into_iter().chain(others) {
+        for (texels, side) in flat.into_iter().chain([(Texels::Grid, CHECKED)]) {
             let model = folder.join(file);
             let run = move || built(&model, texels, side, genus, loops);
             let name = format!("watertight/{texels:?}/{side}/{file}");
@@ -93,12 +91,16 @@ fn built(
 ) -> Result<(), Failed> {
     let folder = tempfile::tempdir()?;
     let mut config = Config::default();
-    config.images.domain = match texels {
-        Texels::Flat | Texels::Lattice => Domain::Flat,
-        Texels::Rectangle => Domain::Rectangle,
-    };
-    config.patches.shared_lattice = texels == Texels::Lattice;
-    config.patches.texel_budget = side * side;
+    match texels {
+        Texels::Flat => {
+            config.images.domain = Some(Domain::Flat);
+            config.patches.texel_budget = side * side;
+        }
+        Texels::Grid => {
+            let of_cell = config.grid.samples_per_cell.pow(2);
+            config.grid.cells = side * side / of_cell;
+        }
+    }
     config.pictures.enabled = false;
     config.report.enabled = false;
     let outcome = job::run(model, "model", folder.path(), "asset", &config, &());
@@ -106,17 +108,11 @@ fn built(
         return Err(format!("{:?}", outcome.state).into());
     }
     let atlas = folder.path().join("asset");
-    // That of flat images with texels of their own is asked about the default in `corpus`.
-    if side == CHECKED && texels != Texels::Flat {
+    // That of flat images is asked about in `corpus`.
+    if texels == Texels::Grid {
         checked(&atlas, comparable(model), None)?;
     }
-    // In a crowded corner of a rectangle texels are so close to each other that float32 cannot tell three of them from a line.
-    Ok(watertight(
-        &atlas,
-        genus,
-        loops,
-        texels != Texels::Rectangle,
-    )?)
+    Ok(watertight(&atlas, genus, loops, true)?)
 }
 
 /// Mean texel spacing on the surface and RMS error, for one budget.
@@ -132,7 +128,6 @@ fn measure(atlas: &AffineAtlas, soup: &Soup, side: usize) -> Result<[f64; 3], Fa
         &atlas.cut,
         &atlas.central,
         None,
-        Domain::Flat,
         &params,
     )?;
     let scale = &atlas.metric.log_scale;
@@ -168,7 +163,7 @@ fn slope(rows: &[[f64; 3]]) -> f64 {
 }
 
 fn order(name: &str, soup: &Soup, sides: &[usize], least: f64) -> Result<(), Failed> {
-    let config = Config::default();
+    let config = Config::default().on_flat_patches();
     let mut atlases = build(soup, &config, &())?;
     let atlas = atlases.remove(0)?;
     let rows = sides

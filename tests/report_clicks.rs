@@ -22,12 +22,8 @@ fn main() {
         trial("boundaries", || {
             report("three-boundaries-rabbit.ply", "boundaries", &[])
         }),
-        trial("rectangles", || {
-            report(
-                "genus-1-mug.off",
-                "rectangles",
-                &["images.domain=rectangle"],
-            )
+        trial("flat", || {
+            report("genus-1-mug.off", "flat", &["images.domain=flat"])
         }),
         trial("hostile_name", || report("disk-mask.obj", HOSTILE, &[])),
         trial("undrawn", undrawn),

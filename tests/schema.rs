@@ -57,14 +57,14 @@ fn assert_refused(validator: &Validator, good: &Value, changes: &[(&str, Option<
     }
 }
 
-/// Every fixture in one output root, good ones and bad ones, flat and rectangle.
+/// Every fixture in one output root, good ones and bad ones, flat and grid.
 fn build_all(root: &Path) {
     for (folder, settings) in [
         ("good", &["images.domain=flat"][..]),
         ("bad", &["images.domain=flat"]),
         (
             "good",
-            &["images.domain=rectangle", "flow.scheme=vertex-scaling"],
+            &["images.domain=grid", "flow.scheme=vertex-scaling"],
         ),
     ] {
         let names = std::fs::read_dir(Path::new("fixtures").join(folder)).expect("fixtures");

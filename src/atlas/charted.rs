@@ -77,7 +77,8 @@ fn between<const N: usize>(values: [[f64; N]; 3], weights: [f64; 3]) -> [f64; N]
     }
 }
 
-fn lift_mesh(mesh: Mesh, fine: &Subdivision) -> Mesh {
+/// A mesh with finer faces; attributes are interpolated.
+pub(crate) fn lift_mesh(mesh: Mesh, fine: &Subdivision) -> Mesh {
     let c = &fine.connectivity;
     let mut source_vertex = mesh.source_vertex.into_vec();
     source_vertex.resize(c.vertex_count(), NONE);

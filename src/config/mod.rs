@@ -91,17 +91,20 @@ pub struct Config {
 }
 
 impl Config {
-    /// The effective configuration without what cannot change an output byte of one asset: the
+    /// The effective configuration, resolved, without what cannot change an output byte of one asset: the
     /// list of inputs, the output folder, the number of threads, and where cones and features were read from once they are in their lists.
     #[must_use]
     pub fn canonical(&self) -> Self {
-        let mut cones = self.cones.clone();
+        // Settings that contradict each other have no effect: nothing is built with them.
+        let own = self.clone().resolved();
+        let own = own.unwrap_or_else(|_| self.clone());
+        let mut cones = own.cones.clone();
         if cones.file.is_some() && !cones.list.is_empty() {
             // That it was a file matters: its curvatures count as rounded.
             cones.file = Some(PathBuf::new());
             cones.file_first_vertex = 0;
         }
-        let mut features = self.features.clone();
+        let mut features = own.features.clone();
         if !features.list.is_empty() {
             features.file = None;
             features.file_first_vertex = 0;
@@ -114,7 +117,7 @@ impl Config {
             run: RunParams::default(),
             preset: None,
             asset: Vec::new(),
-            ..self.clone()
+            ..own
         }
     }
 

@@ -19,7 +19,7 @@ pub enum Preset {
     /// One image of 1024 by 1024 with all patches, at most 64 where that is possible (Yan et al. 2024, Object Images).
     #[serde(rename = "omage-1024")]
     Omage1024,
-    /// Cones of quarter turns, across whose cuts a texture on square texels goes on.
+    /// A coarse grid: a tile of a pattern lies on each of its cells.
     #[serde(rename = "texture")]
     Texture,
 }
@@ -41,9 +41,7 @@ impl Preset {
     pub fn settings(self) -> &'static str {
         match self {
             // Four times the default: a knot interval takes four sample steps, so that the splines' error is about half.
-            Self::SplineFit => {
-                "[images]\ndomain = \"rectangle\"\n[patches]\ntexel_budget = 1048576\n"
-            }
+            Self::SplineFit => "[images]\ndomain = \"grid\"\n[grid]\nsamples_per_cell = 16\n",
             // More cones vary less in scale, and one texel of padding is what bilinear interpolation needs: at so few texels each counts.
             Self::GeometryImage256 => {
                 "[cones]\ncount = 16\n[images]\ndomain = \"flat\"\nchannels = [\"normal\"]\n[patches]\n\
@@ -53,7 +51,7 @@ impl Preset {
                 "[images]\ndomain = \"flat\"\nchannels = [\"normal\"]\n[patches]\n\
                  texel_budget = 1048576\nmax_count = 64\npacked_side = 1024\n"
             }
-            Self::Texture => "[cones]\nquantum = \"1/2\"\n[images]\ndomain = \"flat\"\n",
+            Self::Texture => "[images]\ndomain = \"grid\"\n[grid]\ncells = 500\n",
         }
     }
 }

@@ -113,12 +113,6 @@ impl Subdivision {
         split.vertex
     }
 
-    /// Length of an edge in space.
-    pub fn edge_length(&self, e: EdgeId) -> f64 {
-        let [a, b] = self.connectivity.edge_vertices(e);
-        crate::geometry::mesh::distance(self.position[a], self.position[b])
-    }
-
     /// The side of its parent face that a halfedge runs along, from corner to corner counterclockwise; `None` inside.
     pub fn side_of_parent(&self, h: HalfedgeId) -> Option<usize> {
         let ends = [h, self.connectivity.next(h)].map(|h| self.corner[h].weights);

@@ -4,6 +4,7 @@
 //! *Guaranteed:* coordinates are multiples of 2⁻ᵏ (k as large as float64 holds them), so that what is computed from them is exact; every face has a positive area, or an error.
 
 use super::blocks::Blocks;
+use super::dirichlet::relax;
 use super::error::GridError;
 use super::map::{Anchor, Freedom, GridMap, is_turned_over};
 use super::quads::QuadMesh;
@@ -35,6 +36,7 @@ pub(crate) fn cut(
     map: &mut GridMap,
     mesh: &QuadMesh,
     blocks: &Blocks,
+    cell_size: f64,
 ) -> Result<Vec<Option<Placed>>, GridError> {
     let mut is_wall = vec![[false; 4]; mesh.quads.len()];
     for block in &blocks.blocks {
@@ -82,7 +84,7 @@ pub(crate) fn cut(
         let square = square as u32;
         return Err(GridError::NoRectangle { square });
     }
-    settle(map, &placed)?;
+    settle(map, &placed, cell_size)?;
     Ok(placed)
 }
 
@@ -217,8 +219,9 @@ impl QuadMesh {
     }
 }
 
-/// Puts vertices exactly where they are to be: those of lines on them, all on multiples of a power of two.
-fn settle(map: &mut GridMap, placed: &[Option<Placed>]) -> Result<(), GridError> {
+/// Puts vertices exactly where they are to be: those of lines on them, all on multiples of a power of two. In between the map is relaxed once more, since drawing
+/// lines squeezes a few faces.
+fn settle(map: &mut GridMap, placed: &[Option<Placed>], cell_size: f64) -> Result<(), GridError> {
     let c = map.sheet.fine.connectivity.clone();
     for v in placed.iter().flatten().map(|p| p.vertex) {
         map.freedom[v] = Freedom::Fixed;
@@ -258,6 +261,9 @@ fn settle(map: &mut GridMap, placed: &[Option<Placed>]) -> Result<(), GridError>
             map.put(v, place);
         }
     };
+    round(map);
+    thicken(map);
+    relax(map, cell_size)?;
     round(map);
     thicken(map);
     round(map);

@@ -223,7 +223,7 @@ fn joined(mesh: &QuadMesh, blocks: &Blocks, filled: f64) -> Vec<Island> {
     }
 }
 
-/// Joins blocks to islands, turns them, and packs the islands into a square, each cell `samples` texels wide and islands with a gutter of so many texels around them.
+/// Joins blocks to islands, turns them, and packs the islands into a square, each cell `samples` texels wide, with so many texels between islands.
 pub(super) fn arrange(
     mesh: &QuadMesh,
     blocks: &mut Blocks,

@@ -19,6 +19,7 @@ mod params;
 mod patches;
 pub mod quads;
 pub mod quantise;
+mod refine;
 pub(crate) mod sheet;
 pub(crate) mod slivers;
 #[cfg(test)]
@@ -28,6 +29,7 @@ mod walk;
 pub use distortion::Distortion;
 pub use error::GridError;
 pub use params::GridParams;
+pub(crate) use refine::refined;
 
 use crate::atlas::charted::{self, Charted};
 use crate::atlas::geometry_image::GeometryImage;
@@ -155,7 +157,7 @@ fn made(
         energy = relaxed.energy[1],
         "grid"
     );
-    let placed = cut::cut(&mut map, &quads, &blocks)?;
+    let placed = cut::cut(&mut map, &quads, &blocks, cell_size)?;
     let located = layout::locate(&map, &quads, &blocks, &placed)?;
     let k = &map.sheet.fine.connectivity;
     let of_edges = |f, of: &dyn Fn(HalfedgeId) -> [i64; 2]| {

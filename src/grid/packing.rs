@@ -178,19 +178,18 @@ fn strip(masks: &[[Mask; 2]], order: &[usize], width: usize) -> (Vec<([usize; 2]
     (places, height)
 }
 
-/// Packs islands whose cells are `samples` texels wide, with so many texels around each.
+/// Packs islands whose cells are `samples` texels wide, with so many texels between them.
 pub(super) fn pack(outlines: &[Outline], samples: usize, gutter: usize) -> Packed {
     let cells: usize = outlines.iter().map(|o| o.cells.len()).sum();
-    let gap = 2 * gutter;
     let texels = (cells as f64).sqrt() * samples as f64;
-    let unit = gap.max(1).max((texels / FINEST as f64).ceil() as usize);
+    let unit = gutter.max(1).max((texels / FINEST as f64).ceil() as usize);
     // As many squares of the raster to a cell as there can be without gaps.
     let unit = (1..=unit)
         .rev()
         .find(|u| samples.is_multiple_of(*u) && u * 4 > unit)
         .unwrap_or(unit);
     let mask =
-        |o: &Outline| [false, true].map(|is_turned| Mask::new(o, is_turned, samples, gap, unit));
+        |o: &Outline| [false, true].map(|is_turned| Mask::new(o, is_turned, samples, gutter, unit));
     let masks: Vec<[Mask; 2]> = outlines.par_iter().map(mask).collect();
     let area = |i: usize| -> usize {
         let runs = masks[i][0].runs.iter().flatten();
@@ -233,7 +232,7 @@ pub(super) fn pack(outlines: &[Outline], samples: usize, gutter: usize) -> Packe
     Packed {
         corner: places
             .iter()
-            .map(|(at, _)| at.map(|n| n * unit + gutter))
+            .map(|(at, _)| at.map(|n| n * unit + gutter / 2))
             .collect(),
         is_turned: places.iter().map(|(_, is_turned)| *is_turned).collect(),
         side: side.max(1) * unit,
@@ -260,8 +259,9 @@ mod tests {
         }
     }
 
-    /// Texels that islands take with their gutters, each by one.
+    /// Whether islands with their gutters overlap or lie outside.
     fn overlaps(outlines: &[Outline], packed: &Packed, samples: usize, gutter: usize) -> bool {
+        let (before, after) = (gutter / 2, gutter.div_ceil(2));
         let mut taken = vec![0; packed.side * packed.side];
         for (i, o) in outlines.iter().enumerate() {
             let mut own = std::collections::BTreeSet::new();
@@ -271,9 +271,9 @@ mod tests {
                     false => [x, y],
                 };
                 let [left, low] = [0, 1].map(|k| packed.corner[i][k] + [x, y][k] * samples);
-                for v in low - gutter..low + samples + gutter {
+                for v in low - before..low + samples + after {
                     own.extend(
-                        (left - gutter..left + samples + gutter).map(|u| v * packed.side + u),
+                        (left - before..left + samples + after).map(|u| v * packed.side + u),
                     );
                 }
             }

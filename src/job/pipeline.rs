@@ -52,9 +52,14 @@ fn pipeline(
     enter("cones")?;
     let frame = component.frame;
     let mesh = component.mesh?;
-    let prescription = prescribed(&mesh, requests, config)?;
     let (given, given_faces) = (mesh.positions.clone(), mesh.connectivity.to_faces());
     let source = SourceSurface::of(&mesh, &config.images);
+    let mesh = match config.domain() {
+        // Features that were named are edges of the mesh as it is.
+        Domain::Grid if requests.features.is_empty() => grid::refined(mesh),
+        _ => mesh,
+    };
+    let prescription = prescribed(&mesh, requests, config)?;
     let Flattened {
         mesh,
         metric,

@@ -45,6 +45,7 @@ macro_rules! element {
     };
 }
 element!(f64, "float64", "<f8");
+element!(i64, "int64", "<i8");
 element!(u32, "uint32", "<u4");
 element!(u8, "uint8", "|u1", "<u1", "u1");
 

@@ -318,7 +318,7 @@ pub(super) fn read(folder: &Path, verdicts: &mut Verdicts) -> Option<Document> {
     };
     verdicts.note(
         "format",
-        value["format"] == "affine-atlas" && value["version"] == 1,
+        value["format"] == "affine-atlas" && [1, 2].map(Value::from).contains(&value["version"]),
         "",
     );
     let lacking = lacking_keys(&value);

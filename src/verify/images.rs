@@ -183,7 +183,10 @@ fn check_text(text: Option<&str>, patch: &Patch, document: &Document) -> Option<
         Ok(value) => value,
         Err(error) => return Some(format!("affineAtlas is no JSON: {error}")),
     };
-    if value["version"] != 1 {
+    if ![1, 2]
+        .map(serde_json::Value::from)
+        .contains(&value["version"])
+    {
         return Some(format!("affineAtlas has version {}", value["version"]));
     }
     if value["patch"].as_u64() != Some(patch.id as u64) {

@@ -228,9 +228,12 @@ fn attributes_are_those_of_the_files_faces() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mesh = folder.path().join("bumpy.obj");
     let source = bumpy(&mesh);
-    for (domain, outside) in [("flat", true), ("rectangle", false)] {
+    for (domain, size, outside) in [
+        ("flat", "patches.texel_budget=40000", true),
+        ("grid", "grid.cells=600", false),
+    ] {
         let domain = format!("images.domain={domain}");
-        let built = build(&mesh, &[ALL, &domain, "patches.texel_budget=40000"]);
+        let built = build(&mesh, &[ALL, &domain, size]);
         let atlas = built.atlas();
         verify(&atlas);
         let (mut worst, mut tested, mut around) = (0.0f64, 0, 0);

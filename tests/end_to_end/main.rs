@@ -11,16 +11,15 @@ mod features;
 mod fit;
 mod flows;
 mod good;
+mod grids;
 mod hard;
 #[cfg(unix)]
 mod interrupt;
-mod lattice;
 mod packed;
 mod prescriptions;
 #[path = "../real_models/mod.rs"]
 mod real_models;
 mod rebuild;
-mod rectangles;
 mod refusals;
 mod replacing;
 mod survey;

@@ -121,16 +121,6 @@ fn any_side_and_any_channels_are_packed() {
     assert_eq!(assert_packed(&atlas, &names).0, 200);
 }
 
-#[test]
-fn patches_on_a_lattice_are_packed() {
-    let settings = ["patches.packed_side=256", "patches.shared_lattice=true"];
-    let built = build(Path::new("fixtures/good/genus-3-pretzel.obj"), &settings);
-    let atlas = built.atlas();
-    verify(&atlas);
-    let names = [&OMAGE[..], &["surface.face", "surface.logScale"]].concat();
-    assert_eq!(assert_packed(&atlas, &names).0, 256);
-}
-
 /// Runs a build that says what it warns of.
 fn loud(mesh: &str, settings: &[&str]) -> Built {
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -22,10 +22,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Names of configurations with their settings. All but the first leave out pictures and pages, which tell nothing of an atlas.
-const CONFIGURATIONS: [(&str, &[&str]); 20] = [
+const CONFIGURATIONS: [(&str, &[&str]); 19] = [
     ("defaults", &[]),
     ("plain", PLAIN),
-    ("rectangle", &["images.domain=rectangle"]),
+    ("flat", &["images.domain=flat"]),
     ("thurston", &["flow.scheme=thurston"]),
     ("tangential", &["flow.scheme=tangential"]),
     ("inversive-distance", &["flow.scheme=inversive-distance"]),
@@ -50,7 +50,6 @@ const CONFIGURATIONS: [(&str, &[&str]); 20] = [
             "images.normal_precision=half",
         ],
     ),
-    ("lattice", &["patches.shared_lattice=true"]),
     ("corners", &["boundary.condition=corners"]),
     ("uniform", &["boundary.condition=uniform"]),
     ("weld", &["repair.weld_tolerance=0.1"]),
@@ -60,7 +59,11 @@ const CONFIGURATIONS: [(&str, &[&str]); 20] = [
 
 const PLAIN: &[&str] = &["pictures.enabled=false", "report.enabled=false"];
 
-const FIELD: &[&str] = &["cones.strategy=field", "flow.holonomy=quarter-turns"];
+const FIELD: &[&str] = &[
+    "images.domain=flat",
+    "cones.strategy=field",
+    "flow.holonomy=quarter-turns",
+];
 
 /// What may be wrong with a mesh or a configuration; everything else is wrong with the program, or costs too much.
 const REFUSALS: [&str; 3] = ["input", "prescription", "not_converged"];

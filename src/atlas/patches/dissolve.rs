@@ -3,13 +3,10 @@
 //! [`dissolve`] divides a patch among several neighbours, face by face, or leaves it as it was. Every single step keeps all patches disks, injective and inside the range of log scale.
 
 use super::borders::{around, borders};
-use super::overlap::overlap;
-use super::placement::{Placement, TOUCHING, centroid, place};
+use super::placement::place;
 use super::slit::Slit;
-use crate::atlas::plane;
 use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId};
 use rustc_hash::FxHashSet as Set;
-use std::collections::BTreeSet;
 
 /// Patches of more faces are not divided: their neighbours would become ragged.
 const DIVIDED: usize = 600;
@@ -77,44 +74,6 @@ impl<'a> Parts<'a> {
     fn can_take(&self, f: FaceId, part: u32) -> bool {
         let (sides, corners) = self.shared(f, part);
         sides > 0 && corners == sides + 1
-    }
-
-    /// True where the face's own part stays a disk without it: the face is an ear, or has one side on the
-    /// border and the corner opposite to it inside.
-    fn can_give(&self, f: FaceId) -> bool {
-        let part = self.label[f];
-        let (sides, corners) = self.shared(f, part);
-        let c = self.slit.connectivity;
-        let is_inside = |h: &HalfedgeId| {
-            let other = |h: HalfedgeId| self.slit.across(h).map(|t| c.face(t));
-            other(*h).is_some_and(|n| self.label[n] == part)
-        };
-        match (sides, corners) {
-            (1, 2) => true,
-            (2, 3) => {
-                let border = c.face_halfedges(f).into_iter().find(|h| !is_inside(h));
-                border.is_some_and(|h| self.is_interior(c.prev(h), part))
-            }
-            _ => false,
-        }
-    }
-
-    /// True where all faces around the tail of a halfedge are the part's and the slit disk is whole there.
-    fn is_interior(&self, start: HalfedgeId, part: u32) -> bool {
-        let c = self.slit.connectivity;
-        let mut h = start;
-        loop {
-            if self.label[c.face(h)] != part {
-                return false;
-            }
-            let Some(next) = self.slit.across(c.prev(h)) else {
-                return false;
-            };
-            if next == start {
-                return true;
-            }
-            h = next;
-        }
     }
 }
 

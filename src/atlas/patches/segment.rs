@@ -14,7 +14,7 @@
 //! last digits of the metric does not change the patches.
 
 use super::coverage::Coverage;
-use super::dissolve::{dissolve, widen};
+use super::dissolve::dissolve;
 use super::holes::split_at_holes;
 use super::merge::merge;
 use super::overlap::Triangle;

@@ -53,11 +53,11 @@ fn a_preset_lies_below_the_file_and_the_file_below_set() {
         other.patches.texel_budget,
         Config::default().patches.texel_budget
     );
-    assert_eq!(other.cones.quantum.to_string(), "1/2");
+    assert_eq!(other.grid.cells, 500);
     // A key written with the value that it has by default counts as written.
     assert_eq!(
         budget(
-            "preset = \"spline-fit\"\n[patches]\ntexel_budget = 262144",
+            "preset = \"geometry-image-256\"\n[patches]\ntexel_budget = 262144",
             &[]
         ),
         262144
@@ -124,22 +124,22 @@ fn channels_are_a_set_of_known_words() {
 }
 
 #[test]
-fn keys_of_flat_images_are_refused_for_rectangles_wherever_the_keys_stand() {
-    let packed = "[patches]\npacked_side = 512";
-    assert!(parse("f", packed, &[]).is_ok());
+fn a_preset_and_a_key_that_contradict_each_other_are_refused() {
     for (text, set) in [
-        (packed, "images.domain=rectangle"),
-        ("patches.shared_lattice = true", "preset=spline-fit"),
-        (packed, "preset=spline-fit"),
-        ("preset = \"omage-1024\"", "images.domain=rectangle"),
+        ("preset = \"omage-1024\"", "images.domain=grid"),
+        ("patches.packed_side = 512", "preset=spline-fit"),
     ] {
         let error = parse("f", text, &[set.to_owned()]).expect_err(text);
-        assert!(matches!(error, ConfigError::OnlyFlat { .. }), "{error}");
+        assert!(matches!(error, ConfigError::Domain { .. }), "{error}");
     }
-    // The preset's domain lies below the user's own.
-    let set = [
-        "patches.packed_side=512".to_owned(),
-        "images.domain=flat".to_owned(),
-    ];
-    assert!(parse("f", "preset = \"spline-fit\"", &set).is_ok());
+    let error = parse("f", "images.domain = \"rectangle\"", &[]).expect_err("gone");
+    assert!(
+        error.to_string().contains("images.domain = \"grid\""),
+        "{error}"
+    );
+    let error = parse("f", "patches.shared_lattice = true", &[]).expect_err("gone");
+    assert!(
+        error.to_string().contains("images.domain = \"grid\""),
+        "{error}"
+    );
 }

@@ -1,7 +1,7 @@
-//! A checkerboard in flat coordinates that stays readable whatever the scale.
+//! A checkerboard in flat coordinates that stays readable whatever the scale. On a grid it is that of `TEXCOORD_0`, whose squares are cells.
 
 use super::colour::{Linear, mix};
-use crate::atlas::plane::rotate;
+use crate::atlas::plane::{doubled_area, rotate};
 use crate::geometry::ids::FaceId;
 use crate::geometry::mesh::triangle_area;
 use crate::product::AffineAtlas;
@@ -31,12 +31,16 @@ impl Checkerboard<'_> {
         let mut sums = vec![[0.0; 2]; mesh.positions.len()];
         for f in mesh.connectivity.faces() {
             let area = triangle_area(mesh.face_positions(f));
-            // From the flat lengths: tiny faces have no reliable area in the chart's coordinates.
-            let lengths = mesh
-                .connectivity
-                .face_edges(f)
-                .map(|e| atlas.metric.length[e]);
-            let scale = 0.5 * (heron(lengths) / area).log2();
+            let flat = match &atlas.grid {
+                Some(grid) => 0.5 * doubled_area(grid.uv[f]),
+                // From the flat lengths: tiny faces have no reliable area in the chart's coordinates.
+                None => heron(
+                    mesh.connectivity
+                        .face_edges(f)
+                        .map(|e| atlas.metric.length[e]),
+                ),
+            };
+            let scale = 0.5 * (flat / area).log2();
             if scale.is_finite() && area.is_finite() {
                 scales.push((scale, area));
                 for v in mesh.connectivity.face_vertices(f) {
@@ -46,8 +50,13 @@ impl Checkerboard<'_> {
             }
         }
         scales.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let middle = weighted_quantile(&scales, 0.5);
-        let side = (mesh.diagonal() / CELLS).max(f64::MIN_POSITIVE);
+        let (middle, side) = match &atlas.grid {
+            Some(grid) => (-grid.cell_size.log2(), grid.cell_size),
+            None => {
+                let side = (mesh.diagonal() / CELLS).max(f64::MIN_POSITIVE);
+                (weighted_quantile(&scales, 0.5), side)
+            }
+        };
         let level = sums
             .into_iter()
             .map(|[sum, area]| if area > 0.0 { middle - sum / area } else { 0.0 });
@@ -96,12 +105,20 @@ impl Checkerboard<'_> {
         CORNERS.map(|weights| self.place(f, weights, cell))
     }
 
-    /// Central-chart coordinates of a point of a face, up to an even number of cells.
+    /// Central-chart coordinates of a point of a face, up to an even number of cells; on a grid, coordinates in its island.
     ///
     /// They are taken through the patch, which keeps full precision where the chart's own coordinates, far from its
     /// origin, could not tell the cells of a tiny face apart.
     fn place(&self, f: FaceId, weights: [f64; 3], cell: f64) -> [f64; 2] {
         let layout = &self.atlas.patches;
+        if let Some(grid) = &self.atlas.grid {
+            let (_, offset) = grid.islands.place[layout.face_patch[f].index()];
+            let uv = &layout.uv[f];
+            return std::array::from_fn(|i| {
+                let at = (0..3).map(|k| weights[k] * uv[k][i]);
+                at.sum::<f64>() + offset[i] as f64
+            });
+        }
         let patch = layout.patches.get(layout.face_patch[f].index());
         let motion = patch.and_then(|patch| patch.to_chart);
         let uv = match motion {

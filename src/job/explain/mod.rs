@@ -12,12 +12,13 @@ mod turns;
 
 use super::flatten::{Flattened, flatten, prescribed};
 use super::listing::counted;
-use super::{BuildError, Requests, cones, read, repair};
+use super::{BuildError, cones, read, repair};
 use crate::atlas::patch::Domain;
 use crate::config::Config;
 use crate::export::ExportError;
 use crate::export::glb::marked::{self, Marked};
 use crate::export::manifest::{Manifest, Record, State};
+use crate::flow::cones::Requests;
 use crate::geometry::mesh::Soup;
 use crate::outcome::{Failure, FailureKind};
 use crate::read::atlas::{FolderError, component_folders};

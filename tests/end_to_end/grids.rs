@@ -1,0 +1,193 @@
+//! Grids: full images whose sides hold the same points, on every good fixture; checked from the files alone.
+
+use crate::arrays::array;
+use crate::command::{build, build_into, document, verify};
+use crate::good::files;
+use affine_atlas::read::atlas::{StoredImage, read_images};
+use serde_json::Value;
+use std::path::Path;
+
+fn number(value: &Value) -> usize {
+    value.as_u64().expect("a count") as usize
+}
+
+/// The texels of side s, counterclockwise; row 0 is the lowest.
+fn texels(image: &StoredImage, s: usize) -> Vec<[f32; 3]> {
+    let [right, top] = [image.width - 1, image.height - 1];
+    let places: Vec<[usize; 2]> = match s {
+        0 => (0..=right).map(|x| [x, 0]).collect(),
+        1 => (0..=top).map(|y| [right, y]).collect(),
+        2 => (0..=right).rev().map(|x| [x, top]).collect(),
+        _ => (0..=top).rev().map(|y| [0, y]).collect(),
+    };
+    let at = |&[x, y]: &[usize; 2]| image.position[image.width * y + x];
+    places.iter().map(at).collect()
+}
+
+/// Pieces cover every side in order, and hold to the last bit what the other image holds there. How many texels were compared.
+fn assert_same_points(patches: &[Value], images: &[StoredImage]) -> usize {
+    let mut compared = 0;
+    for (p, patch) in patches.iter().enumerate() {
+        assert_eq!(patch["domain"], "grid");
+        assert!(patch["patch_to_chart"].is_null());
+        let samples = number(&patch["samples_per_cell"]);
+        let cells = [0, 1].map(|i| number(&patch["cells"][i]));
+        for (i, size) in ["width", "height"].into_iter().enumerate() {
+            assert_eq!(number(&patch[size]), cells[i] * samples + 1);
+        }
+        for s in 0..4 {
+            let own = texels(&images[p], s);
+            let mut end = 0;
+            for piece in patch["sides"][s].as_array().expect("pieces") {
+                let [start, length] = ["start", "length"].map(|key| number(&piece[key]));
+                assert_eq!(start, end);
+                end = start + length;
+                if piece["patch"].is_null() {
+                    continue;
+                }
+                let [other, side, from] =
+                    ["patch", "side", "other_start"].map(|key| number(&piece[key]));
+                let other = texels(&images[other], side);
+                let own = own[start * samples..=end * samples].iter();
+                let across = other[from * samples..=(from + length) * samples]
+                    .iter()
+                    .rev();
+                assert!(own.clone().eq(across), "side {s} of patch {p}");
+                compared += own.len();
+            }
+            assert_eq!(end, cells[s % 2], "side {s} of patch {p}");
+        }
+    }
+    compared
+}
+
+/// Every image holds the points of the quad mesh at the corners of its cells.
+fn assert_corners(atlas: &Path, patches: &[Value], images: &[StoredImage], origin: [f64; 3]) {
+    let positions: Vec<f64> = array(atlas, "quad_positions");
+    let quads: Vec<u32> = array(atlas, "quads");
+    let patch: Vec<u32> = array(atlas, "quad_patch");
+    let cell: Vec<u32> = array(atlas, "quad_cell");
+    for (q, corners) in quads.as_chunks::<4>().0.iter().enumerate() {
+        let p = patch[q] as usize;
+        let samples = number(&patches[p]["samples_per_cell"]);
+        let [column, row] = [0, 1].map(|i| cell[2 * q + i] as usize);
+        let places = [[0, 0], [1, 0], [1, 1], [0, 1]];
+        for ([i, j], v) in places.into_iter().zip(corners) {
+            let at = (row + j) * samples * images[p].width + (column + i) * samples;
+            let point = std::array::from_fn(|x| positions[3 * *v as usize + x] - origin[x]);
+            assert_eq!(
+                images[p].position[at],
+                point.map(|x: f64| x as f32),
+                "cell {q}"
+            );
+        }
+    }
+}
+
+fn grid(fixture: &str) {
+    let mesh = format!("fixtures/good/{fixture}");
+    let built = build(Path::new(&mesh), &[]);
+    let atlas = built.atlas();
+    verify(&atlas);
+    let described = document(&atlas);
+    let patches = described["patches"].as_array().expect("a list");
+    assert_eq!(described["grid"]["turned_over"], 0);
+    assert_eq!(number(&described["grid"]["blocks"]), patches.len());
+    let folder = read_images(&atlas).expect("readable");
+    assert!(assert_same_points(patches, &folder.images) > 1000);
+    assert_corners(&atlas, patches, &folder.images, folder.image_origin);
+    assert!(atlas.join("quads.obj").is_file());
+}
+
+#[test]
+fn genus_0_animal() {
+    grid("genus-0-animal.ply");
+}
+
+#[test]
+fn genus_0_cube() {
+    grid("genus-0-cube.obj");
+}
+
+#[test]
+fn genus_1_mug() {
+    grid("genus-1-mug.off");
+}
+
+#[test]
+fn genus_2_amphora() {
+    grid("genus-2-amphora.glb");
+}
+
+#[test]
+fn genus_3_pretzel() {
+    grid("genus-3-pretzel.obj");
+}
+
+#[test]
+fn disk_mask() {
+    grid("disk-mask.obj");
+}
+
+#[test]
+fn three_boundaries_rabbit() {
+    grid("three-boundaries-rabbit.ply");
+}
+
+/// Texels of one image moved by the least there is are found.
+#[test]
+fn verify_compares_sides() {
+    use exr::prelude::{FlatSamples, WritableImage, read_all_flat_layers_from_file};
+    let built = build(Path::new("fixtures/good/genus-0-cube.obj"), &[]);
+    let atlas = built.atlas();
+    let path = atlas.join("images/0000.exr");
+    let mut image = read_all_flat_layers_from_file(&path).expect("an image");
+    for channel in &mut image.layer_data[0].channel_data.list {
+        if let (true, FlatSamples::F32(values)) = (channel.name.eq("G"), &mut channel.sample_data) {
+            values[0] = f32::from_bits(values[0].to_bits() ^ 1);
+        }
+    }
+    image.write().to_file(&path).expect("written");
+    let output = crate::command::program().arg("verify").arg(&atlas).output();
+    let said = output.expect("the program starts").stdout;
+    let said = String::from_utf8_lossy(&said);
+    let name = "FAIL  images of blocks hold the same points along common sides";
+    assert!(said.contains(name), "{said}");
+}
+
+#[test]
+fn the_same_bytes_for_any_number_of_threads() {
+    let mesh = Path::new("fixtures/good/genus-2-amphora.glb");
+    let run = |threads: &str| {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let output = build_into(folder.path(), mesh, &[threads, "grid.cells=700"]);
+        assert_eq!(output.status.code(), Some(0));
+        folder
+    };
+    let (one, two) = (run("run.threads=1"), run("run.threads=2"));
+    let of = |folder: &tempfile::TempDir| files(&folder.path().join("genus-2-amphora"));
+    assert!(of(&one) == of(&two));
+}
+
+/// What a grid needs and what else was asked for: the flat patches that are built then, and why.
+#[test]
+fn prescribed_cones_give_flat_patches() {
+    let mesh = Path::new("fixtures/good/genus-0-animal.ply");
+    let built = build(mesh, &["cones.strategy=spread"]);
+    let described = document(&built.atlas());
+    assert!(described["grid"].is_null() && described["no_grid"].is_null());
+    assert_eq!(described["patches"][0]["domain"], "flat");
+}
+
+/// Four vertices are fewer than the eight cones that a sphere needs.
+#[test]
+fn a_tetrahedron_has_a_grid() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mesh = folder.path().join("tetrahedron.obj");
+    let text = "v 1 1 1\nv -1 -1 1\nv -1 1 -1\nv 1 -1 -1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    std::fs::write(&mesh, text).expect("written");
+    let built = build(&mesh, &[]);
+    let atlas = built.atlas();
+    verify(&atlas);
+    assert!(number(&document(&atlas)["grid"]["cells"]) >= 6);
+}
