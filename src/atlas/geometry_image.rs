@@ -222,7 +222,6 @@ impl GeometryImage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::atlas::patch::Domain;
     use crate::atlas::patches::samples::{self, Sample};
     use crate::atlas::patches::{PatchParams, layout};
 

@@ -3,7 +3,7 @@
 use super::*;
 use crate::atlas::geometry_image::{image_origin, sample};
 use crate::atlas::patches::samples::{self, Sample, build};
-use crate::atlas::patches::{Domain, PatchParams, layout};
+use crate::atlas::patches::{PatchParams, layout};
 use crate::atlas::plane::doubled_area;
 use crate::geometry::deviation::{Sampling, Triangles, deviation};
 use crate::geometry::mesh::distance;
