@@ -19,7 +19,7 @@ pub enum Preset {
     /// One image of 1024 by 1024 with all patches, at most 64 where that is possible (Yan et al. 2024, Object Images).
     #[serde(rename = "omage-1024")]
     Omage1024,
-    /// Cones of quarter turns, across whose cuts a texture on square texels goes on.
+    /// An integer grid of few cells, on which a repeating texture has no seams.
     #[serde(rename = "texture")]
     Texture,
 }
@@ -53,7 +53,7 @@ impl Preset {
                 "[images]\ndomain = \"flat\"\nchannels = [\"normal\"]\n[patches]\n\
                  texel_budget = 1048576\nmax_count = 64\npacked_side = 1024\n"
             }
-            Self::Texture => "[cones]\nquantum = \"1/2\"\n[images]\ndomain = \"flat\"\n",
+            Self::Texture => "[images]\ndomain = \"grid\"\n[grid]\ncells = 500\n",
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::super::presets::WORDS;
 use super::*;
+use crate::atlas::patches::Domain;
 
 #[test]
 fn every_word_is_a_preset_and_every_preset_changes_something() {
@@ -53,7 +54,7 @@ fn a_preset_lies_below_the_file_and_the_file_below_set() {
         other.patches.texel_budget,
         Config::default().patches.texel_budget
     );
-    assert_eq!(other.cones.quantum.to_string(), "1/2");
+    assert_eq!((other.images.domain, other.grid.cells), (Domain::Grid, 500));
     // A key written with the value that it has by default counts as written.
     assert_eq!(
         budget(
