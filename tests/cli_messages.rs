@@ -448,8 +448,8 @@ fn texture_without_a_folder_or_a_pattern() {
     error: .. does not end in the name of a folder to write
     help: name it with `--out FOLDER`
     ");
-    insta::assert_snapshot!(texture(&[".", "-p", "a.png", "--tile-size", "0"], 2), @r"
-    error: invalid value '0' for '--tile-size <LENGTH>': it must be a positive number
+    insta::assert_snapshot!(texture(&[".", "-p", "a.png", "--tiles", "65"], 2), @r"
+    error: invalid value '65' for '--tiles <N>': 65 is not in 1..=64
 
     For more information, try '--help'.
     ");
@@ -473,6 +473,9 @@ fn texture_without_a_folder_or_a_pattern() {
     )
     .expect("written");
     insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @r#"failed: atlas (input): atlas/atlas.json says format "", version 0; this program reads "affine-atlas", version 1"#);
+    let head = r#"{"format": "affine-atlas", "version": 1, "patches": []}"#;
+    std::fs::write(folder.path().join("atlas/atlas.json"), head).expect("written");
+    insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @r#"failed: atlas (input): atlas/atlas.json has no grid: build with images.domain = "grid"; where that was set, no grid could be made, and the build's warning says why"#);
     let left = std::fs::read_dir(folder.path()).expect("a folder").count();
     assert_eq!(left, 3, "something was written");
 }
@@ -490,17 +493,8 @@ fn wrong_arguments_exit_with_2_and_help_with_0() {
         &["fit"],
         &["fit", ".", "--spacing", "nan"],
         &["texture", "."],
-        &["texture", ".", "-p", "a.png", "--repeat", "0"],
-        &[
-            "texture",
-            ".",
-            "-p",
-            "a.png",
-            "--repeat",
-            "2",
-            "--tile-size",
-            "2",
-        ],
+        &["texture", ".", "-p", "a.png", "--tiles", "0"],
+        &["texture", ".", "-p", "a.png", "--tiles", "1.5"],
         &["plan", "a.obj"],
         &["plan", "a.obj", "-p", "p", "--shards", "0"],
         &["run", "-p", "p", "--shard", "0/3"],

@@ -57,7 +57,7 @@ fn seeds_are_tried_whole() {
 /// All of the small folder can be read, and with each of the seeds that take the place of one of its files: edits of them reach every line.
 #[test]
 fn the_small_folder_and_its_seeds_can_be_read() {
-    use affine_atlas::read::{atlas, flat, metric, read};
+    use affine_atlas::read::{atlas, gridded, metric, read};
     let fuzz = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz");
     let copy = tempfile::tempdir().expect("a folder");
     fs::create_dir(copy.path().join("images")).expect("a folder");
@@ -84,7 +84,7 @@ fn the_small_folder_and_its_seeds_can_be_read() {
         assert_eq!(images.images[0].position.len(), 64, "{shown}");
         atlas::read_surface(copy.path()).unwrap_or_else(|e| panic!("{shown}: {e}"));
         metric::read_metric(copy.path()).unwrap_or_else(|e| panic!("{shown}: {e}"));
-        flat::read_flat(copy.path()).unwrap_or_else(|e| panic!("{shown}: {e}"));
+        gridded::read_gridded(copy.path()).unwrap_or_else(|e| panic!("{shown}: {e}"));
     }
     let path = copy.path().join("a.gltf");
     fs::copy(fuzz.join("corpus/gltf/files.gltf"), &path).expect("copied");

@@ -6,7 +6,7 @@ use affine_atlas::config;
 use affine_atlas::export::manifest::Manifest;
 use affine_atlas::flow::cones;
 use affine_atlas::read::{
-    ReadError, ReadParams, SourceAsset, atlas, fingerprint, flat, metric, read, read_bytes,
+    ReadError, ReadParams, SourceAsset, atlas, fingerprint, gridded, metric, read, read_bytes,
 };
 use affine_atlas::texture::Exemplar;
 use affine_atlas::verify::{VerifyOptions, verify};
@@ -191,8 +191,17 @@ fn pattern(bytes: &[u8]) {
     in_folder(&SMALL, |folder| {
         let path = folder.put("pattern", bytes);
         if let Ok(image) = Exemplar::read(&path) {
-            let _ = (image.border(), image.symmetry(), image.is_transparent());
-            assert!(image.mean([0.3, 0.7], 0.5).iter().all(|x| x.is_finite()));
+            let _ = (
+                image.border(),
+                image.symmetry([1, 2]),
+                image.is_transparent(),
+            );
+            assert!(
+                image
+                    .mean([0.3, 0.7], [0.5, 0.25])
+                    .iter()
+                    .all(|x| x.is_finite())
+            );
         }
     });
 }
@@ -237,7 +246,7 @@ fn npz(bytes: &[u8]) {
             );
         }
         let _ = metric::read_metric(&folder.path);
-        let _ = flat::read_flat(&folder.path);
+        let _ = gridded::read_gridded(&folder.path);
         let _ = atlas::read_images(&folder.path);
     });
 }
@@ -248,7 +257,7 @@ fn atlas_json(bytes: &[u8]) {
         folder.put("atlas.json", bytes);
         let _ = atlas::read_images(&folder.path);
         let _ = metric::read_metric(&folder.path);
-        let _ = flat::read_flat(&folder.path);
+        let _ = gridded::read_gridded(&folder.path);
     });
 }
 

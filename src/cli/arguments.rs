@@ -2,7 +2,7 @@
 
 use affine_atlas::batch::shard::{self, Shard};
 use affine_atlas::fit::{DEFAULT_SPACING, LEAST_SPACING};
-use affine_atlas::job::texture::{DEFAULT_REPEAT, DEFAULT_SIZE, SIZE_RANGE};
+use affine_atlas::job::texture::{DEFAULT_SIZE, SIZE_RANGE, TILES_RANGE};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -225,17 +225,17 @@ It appears when it is complete.";
 
 const TEXTURE_EXAMPLES: &str = "\
 Examples:
-  affine-atlas build bunny.obj --set cones.quantum=1/2
+  affine-atlas build bunny.obj --set preset=texture
   affine-atlas texture affine-atlas-out/bunny --pattern tiles.png
-  affine-atlas texture affine-atlas-out/bunny --pattern tiles.png --repeat 30 --size 4096 -o bunny-tiled
+  affine-atlas texture affine-atlas-out/bunny --pattern tiles.png --tiles 2 --size 4096 -o bunny-tiled
 
-The image is laid in flat coordinates. Where all transitions are quarter turns (cones.quantum = 1/2 on genus 0), these are
-deformed a little so that whole tiles fit; an image that looks the same after a quarter turn then has no
-seams. Elsewhere it jumps at the cut. The new folder holds
+The image is laid on the integer grid of the atlas (images.domain = grid), a whole number of tiles along a
+side of a cell. Where it looks the same after a quarter turn it has no seams; elsewhere it jumps where
+frames of the grid turn. The new folder holds
   NAME.png           the texture for the TEXCOORD_0 of surface.glb (one a component)
   NAME.glb           the surface with that texture
   NAME.preview.png   a picture of it
-  texture.json       size and number of tiles, how far they were moved, colour steps across seams and elsewhere
+  texture.json       number and size of tiles, colour steps across seams and beside them
 It appears when it is complete.";
 
 const INIT_EXAMPLES: &str = "\
@@ -416,27 +416,15 @@ pub struct Texture {
     /// Folder to write, replacing an older one [default: DIR.texture]
     #[arg(short, long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
-    /// Tiles along a side of a square as large as the surface in flat coordinates
-    #[arg(long, value_name = "N", default_value_t = DEFAULT_REPEAT, value_parser = positive)]
-    pub repeat: f64,
-    /// Width of a tile in flat coordinates, in place of a number of tiles
-    #[arg(long, value_name = "LENGTH", value_parser = positive, conflicts_with = "repeat")]
-    pub tile_size: Option<f64>,
+    /// Tiles along a side of a cell of the grid; `grid.cells` of the build says how large cells are
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(TILES_RANGE))]
+    pub tiles: u32,
     /// Texels along a side of the texture
     #[arg(long, value_name = "N", default_value_t = DEFAULT_SIZE, value_parser = clap::value_parser!(u32).range(SIZE_RANGE))]
     pub size: u32,
     /// Write JSON instead of text
     #[arg(long)]
     pub json: bool,
-}
-
-/// A positive number.
-fn positive(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok();
-    let good = |x: &f64| x.is_finite() && *x > 0.0;
-    number
-        .filter(good)
-        .ok_or_else(|| "it must be a positive number".to_owned())
 }
 
 /// A number from the least spacing on.

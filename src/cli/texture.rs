@@ -8,7 +8,7 @@ use super::problem::Problem;
 use super::work::{TextureRequest, Work};
 use super::{exit, interrupt, panics, terminal};
 use affine_atlas::config::Config;
-use affine_atlas::job::texture::{TextureParams, TileSize};
+use affine_atlas::job::texture::TextureParams;
 use affine_atlas::outcome::{Failure, FailureKind};
 use std::path::Path;
 
@@ -38,10 +38,7 @@ pub fn run(texture: &Texture, global: &Global, work: &Work) -> Result<u8, Proble
         name: name.to_string_lossy().into_owned(),
         params: TextureParams {
             pattern: texture.pattern.clone(),
-            tile: match texture.tile_size {
-                Some(width) => TileSize::Width(width),
-                None => TileSize::Repeat(texture.repeat),
-            },
+            tiles: texture.tiles,
             size: texture.size as usize,
         },
     };

@@ -118,6 +118,7 @@ pub(super) fn take(
 mod tests {
     use super::super::load::parse_layers;
     use super::*;
+    use crate::atlas::patches::Domain;
     use crate::config::Limit;
     use crate::flow::ricci::Scheme;
 
@@ -159,7 +160,10 @@ run.timeout = 7
             (Scheme::VertexScaling, 3)
         );
         let config = config_of(TEXT, &[], "one.obj");
-        assert_eq!(config.cones.quantum, "1/2".parse().unwrap());
+        assert_eq!(
+            (config.images.domain, config.grid.cells),
+            (Domain::Grid, 500)
+        );
         assert_eq!(config.run.timeout, Limit::At(7));
         let other = config_of(TEXT, &[], "other/one.obj");
         assert_eq!(other.run.timeout, Limit::Auto);

@@ -1,27 +1,28 @@
 //! From an atlas and an image that repeats to a textured surface: what `affine-atlas texture` does.
 
 use super::fit::folder_name;
+use crate::atlas::plane::doubled_area;
 use crate::export::ExportError;
 use crate::export::folder::{Contents, Staging};
 use crate::export::glb::textured::{self, Textured};
 use crate::export::pictures::colour::to_linear;
 use crate::export::pictures::{encode_png, painted as picture};
-use crate::geometry::connectivity::Connectivity;
+use crate::geometry::connectivity::{Connectivity, ConnectivityError};
 use crate::geometry::ids::{FaceVec, NONE, VertexVec};
 use crate::geometry::mesh::Mesh;
 use crate::outcome::{Failure, FailureKind};
 use crate::read::atlas::{FolderError, component_folders};
-use crate::read::flat::{FlatSurface, read_flat};
+use crate::read::gridded::{GriddedSurface, read_gridded};
 use crate::texture::{
-    Border, Exemplar, ExemplarError, Field, Painted, Steps, Symmetry, TextureError, Tile, as_it_is,
-    fit, flat_area, paint, steps,
+    Border, Exemplar, ExemplarError, MOST_COPIES, Painted, Steps, Symmetry, TileSize, Tiling,
+    paint, steps, tile_size,
 };
 use image::{DynamicImage, RgbaImage};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Tiles along a side of the flat surface.
-pub const DEFAULT_REPEAT: f64 = 16.0;
+/// Tiles along a side of a cell that may be asked for.
+pub const TILES_RANGE: std::ops::RangeInclusive<i64> = 1..=64;
 /// Texels along a side of the texture.
 pub const DEFAULT_SIZE: u32 = 2048;
 /// Texels along a side that may be asked for.
@@ -31,22 +32,13 @@ const FIGURES: &str = "texture.json";
 /// Pixels of the picture.
 const PICTURE: usize = 1024;
 
-/// How large a tile is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum TileSize {
-    /// So many tiles along a side of a square as large as the flat surface.
-    Repeat(f64),
-    /// Width, flat units.
-    Width(f64),
-}
-
 /// What is asked for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TextureParams {
     /// The image.
     pub pattern: PathBuf,
-    /// How large a tile is.
-    pub tile: TileSize,
+    /// Tiles along a side of a cell.
+    pub tiles: u32,
     /// Texels along a side of the texture.
     pub size: usize,
 }
@@ -57,19 +49,17 @@ pub struct TexturedComponent {
     /// Name of its folder.
     pub name: String,
     /// The surface that it lies on.
-    pub surface: FlatSurface,
+    pub surface: GriddedSurface,
     /// The same, for pictures and files.
     pub mesh: Mesh,
-    /// Tile as asked for.
-    pub asked: Tile,
-    /// Tile coordinates.
-    pub field: Field,
+    /// Number of cells.
+    pub cells: usize,
+    /// How large tiles are, source units.
+    pub tile_size: TileSize,
     /// The texture.
     pub painted: Painted,
     /// Colour steps.
     pub steps: Steps,
-    /// Area of the flat surface.
-    pub flat_area: f64,
 }
 
 /// The textures of an asset.
@@ -81,9 +71,11 @@ pub struct TexturedAsset {
     pub pattern: String,
     /// The pattern.
     pub exemplar: Exemplar,
+    /// How it lies on the grid.
+    pub tiling: Tiling,
     /// How its sides fit.
     pub border: Border,
-    /// How it changes when it is turned.
+    /// How a tile changes when it is turned.
     pub symmetry: Symmetry,
 }
 
@@ -96,13 +88,13 @@ pub enum TextureAssetError {
     /// The folder was refused.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// The pattern cannot be laid on the surface.
-    #[error("{name}: {source}")]
-    Texture {
+    /// The faces of a component make no surface.
+    #[error("{name}: the faces of atlas.npz make no surface ({source}); build the atlas again")]
+    Connectivity {
         /// Name of the component's folder.
         name: String,
         /// Why.
-        source: TextureError,
+        source: ConnectivityError,
     },
     /// The texture cannot be written.
     #[error(transparent)]
@@ -128,61 +120,40 @@ impl From<&TextureAssetError> for Failure {
 pub fn texture(folder: &Path, params: &TextureParams) -> Result<TexturedAsset, TextureAssetError> {
     let folders = component_folders(folder)?;
     let exemplar = Exemplar::read(&params.pattern)?;
+    let tiling = Tiling::new(params.tiles, exemplar.size());
     let mut components = Vec::new();
     for folder in folders {
         let name = folder_name(&folder);
-        let surface = read_flat(&folder)?;
-        let refused = |source| TextureAssetError::Texture {
+        let surface = read_gridded(&folder)?;
+        let mesh = mesh(&surface).map_err(|source| TextureAssetError::Connectivity {
             name: name.clone(),
             source,
-        };
-        components.push(component(&name, surface, &exemplar, params).map_err(refused)?);
+        })?;
+        let painted = paint(&surface, &tiling, &exemplar, params.size);
+        let on_grid = surface.grid_uv.iter().map(|&uv| 0.5 * doubled_area(uv));
+        components.push(TexturedComponent {
+            name,
+            cells: on_grid.sum::<f64>().round() as usize,
+            tile_size: tile_size(&surface, &tiling),
+            steps: steps(&surface, &mesh.connectivity, &tiling, &painted),
+            mesh,
+            painted,
+            surface,
+        });
     }
     let name = params.pattern.file_name().unwrap_or_default();
     Ok(TexturedAsset {
         components,
         pattern: name.to_string_lossy().into_owned(),
         border: exemplar.border(),
-        symmetry: exemplar.symmetry(),
+        symmetry: exemplar.symmetry(tiling.copies),
+        tiling,
         exemplar,
     })
 }
 
-fn component(
-    name: &str,
-    surface: FlatSurface,
-    exemplar: &Exemplar,
-    params: &TextureParams,
-) -> Result<TexturedComponent, TextureError> {
-    let mesh = mesh(&surface)?;
-    let area = flat_area(&surface);
-    if !(area > 0.0 && area.is_finite()) {
-        return Err(TextureError::NoArea { area });
-    }
-    let asked = Tile {
-        width: match params.tile {
-            TileSize::Repeat(count) => area.sqrt() / count,
-            TileSize::Width(width) => width,
-        },
-        aspect: exemplar.aspect(),
-    };
-    let fitted = fit(&surface, &mesh.connectivity, asked)?;
-    let field = fitted.unwrap_or_else(|| as_it_is(&surface, asked));
-    let painted = paint(&surface, &field, exemplar, params.size);
-    Ok(TexturedComponent {
-        name: name.to_owned(),
-        steps: steps(&surface, &mesh.connectivity, &painted),
-        mesh,
-        asked,
-        field,
-        painted,
-        flat_area: area,
-        surface,
-    })
-}
-
 /// The surface without anything that textures do not need.
-fn mesh(surface: &FlatSurface) -> Result<Mesh, TextureError> {
+fn mesh(surface: &GriddedSurface) -> Result<Mesh, ConnectivityError> {
     let (vertices, faces) = (surface.positions.len(), surface.faces.len());
     Ok(Mesh {
         connectivity: Connectivity::from_faces(&surface.faces, vertices)?,
@@ -232,21 +203,24 @@ impl TexturedAsset {
         Ok(())
     }
 
-    /// All figures, for programs. Lengths are flat units, colours parts of 255.
+    /// All figures, for programs. Lengths are source units, colours parts of 255.
     pub fn json(&self) -> serde_json::Value {
         let [width, height] = self.exemplar.size();
         let components = self.components.iter().map(|component| {
-            let mut json = component.json();
+            let mut json = component.json(&self.tiling);
             json["warnings"] = self.warnings(component).into();
             json
         });
         serde_json::json!({
             "format": "affine-atlas-texture",
-            "version": 1,
+            "version": 2,
+            "tiles_per_cell": self.tiling.tiles_per_cell,
             "pattern": {
                 "file": self.pattern,
                 "width": width,
                 "height": height,
+                "copies_per_tile": self.tiling.copies,
+                "stretched": self.tiling.is_stretched,
                 "repeats": self.border.repeats(),
                 "border": { "across": self.border.across, "inside": self.border.inside },
                 "quarter_turn": { "symmetric": self.symmetry.has_quarter(), "difference": self.symmetry.quarter },
@@ -266,63 +240,44 @@ impl TexturedAsset {
                 self.pattern, across[0], across[1], inside[0], inside[1]
             ));
         }
-        let turned = |difference: f64, turn: &str| {
-            format!(
+        if self.tiling.is_stretched {
+            let [width, height] = self.exemplar.size();
+            warnings.push(format!(
+                "{} has {width} × {height} pixels, which is no ratio of whole numbers up to {MOST_COPIES}: it is stretched to the square of a tile",
+                self.pattern
+            ));
+        }
+        let Symmetry { quarter, half } = self.symmetry;
+        let [quarters, halves] = component.turns();
+        let turned = if quarters && !self.symmetry.has_quarter() {
+            Some((quarter, "quarter"))
+        } else if halves && !self.symmetry.has_half() {
+            Some((half, "half"))
+        } else {
+            None
+        };
+        if let Some((difference, turn)) = turned {
+            warnings.push(format!(
                 "some transitions are {turn} turns, under which {} changes by {difference:.1} of 255 on average: that shows at the cut",
                 self.pattern
-            )
-        };
-        match &component.field.fitted {
-            Some(fitted) => {
-                let Symmetry { quarter, half } = self.symmetry;
-                if let Some(difference) = quarter
-                    && fitted.quarter_turned
-                    && !self.symmetry.has_quarter()
-                {
-                    warnings.push(turned(difference, "quarter"));
-                } else if fitted.half_turned && !self.symmetry.has_half() {
-                    warnings.push(turned(half, "half"));
-                }
-                if fitted.flipped > 0 {
-                    warnings.push(format!(
-                        "{} of {} faces are turned over where tiles were moved; smaller tiles are moved less (--repeat)",
-                        fitted.flipped,
-                        component.surface.faces.len()
-                    ));
-                }
-            }
-            None => warnings.push(component.why_not_fitted()),
+            ));
         }
         warnings
     }
 }
 
 impl TexturedComponent {
-    /// Width of a tile as it was laid.
-    #[must_use]
-    pub fn tile_width(&self) -> f64 {
-        1.0 / self.field.scale.length()
-    }
-
     /// Tiles on the surface.
     #[must_use]
-    pub fn tiles(&self) -> f64 {
-        self.flat_area / (self.tile_width().powi(2) * self.asked.aspect)
+    pub fn tiles(&self, tiling: &Tiling) -> usize {
+        let per_cell = tiling.tiles_per_cell as usize;
+        self.cells.saturating_mul(per_cell * per_cell)
     }
 
-    fn why_not_fitted(&self) -> String {
-        let other = self.surface.segments.iter();
-        let other = other.filter(|s| s.quarter_turns.is_none()).count();
-        match other {
-            0 => format!(
-                "some transitions are quarter turns, but the tile is no square (height over width {:.3}): the pattern jumps at the cut",
-                self.asked.aspect
-            ),
-            n => format!(
-                "{n} of {} transitions across the cut are no quarter turns: the pattern jumps there (on genus 0, cones.quantum = \"1/2\" makes all of them quarter turns)",
-                self.surface.segments.len()
-            ),
-        }
+    /// Whether some transitions are quarter turns, one way or the other, and whether some are half turns.
+    fn turns(&self) -> [bool; 2] {
+        let turns = self.surface.turns.as_flattened();
+        [turns.iter().any(|t| t % 2 == 1), turns.contains(&2)]
     }
 
     fn packed(&self) -> Vec<[[f64; 2]; 3]> {
@@ -356,39 +311,23 @@ impl TexturedComponent {
         picture(&self.mesh, PICTURE, &colour)
     }
 
-    fn json(&self) -> serde_json::Value {
-        let fitted = self.field.fitted.as_ref().map(|f| {
-            serde_json::json!({
-                "largest_correction": f.largest_correction,
-                "stretch": f.stretch,
-                "largest_misfit": f.largest_misfit,
-                "flipped_faces": f.flipped,
-                "quarter_turned": f.quarter_turned,
-                "half_turned": f.half_turned,
-            })
-        });
-        let scale = self.field.scale;
+    fn json(&self, tiling: &Tiling) -> serde_json::Value {
+        let [quarter, half] = self.turns();
         serde_json::json!({
             "name": self.name,
             "texture": format!("{}.png", self.name),
             "surface": format!("{}.glb", self.name),
             "size": self.painted.size,
             "covered_texels": self.painted.covered,
-            "tile": {
-                "asked_width": self.asked.width,
-                "width": self.tile_width(),
-                "height": self.tile_width() * self.asked.aspect,
-                "rotation": scale.im.atan2(scale.re),
-            },
-            "tiles": self.tiles(),
-            "fitted": fitted,
+            "cells": self.cells,
+            "tiles": self.tiles(tiling),
+            "tile_size": { "p05": self.tile_size.p05, "p95": self.tile_size.p95 },
+            "transitions": { "quarter_turns": quarter, "half_turns": half },
             "colour_step": {
                 "cut": self.steps.cut,
                 "beside_cut": self.steps.beside_cut,
                 "seams": self.steps.seams,
                 "beside_seams": self.steps.beside_seams,
-                "inside": self.steps.inside,
-                "distance": self.steps.distance,
             },
         })
     }
@@ -397,7 +336,7 @@ impl TexturedComponent {
 impl fmt::Display for TexturedAsset {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for component in &self.components {
-            component.fmt(f)?;
+            component.describe(&self.tiling, f)?;
             for warning in self.warnings(component) {
                 writeln!(f, "  warning: {warning}")?;
             }
@@ -406,36 +345,27 @@ impl fmt::Display for TexturedAsset {
     }
 }
 
-impl fmt::Display for TexturedComponent {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl TexturedComponent {
+    fn describe(&self, tiling: &Tiling, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let size = self.painted.size;
         writeln!(
             f,
-            "{}: {:.1} tiles of width {:.6} ({:.6} asked for) in {size} × {size} texels, {:.0} % of them in patches",
+            "{}: {} tiles on {} cells, 9 of 10 between {:.6} and {:.6} wide, in {size} × {size} texels, {:.0} % of them in patches",
             self.name,
-            self.tiles(),
-            self.tile_width(),
-            self.asked.width,
+            self.tiles(tiling),
+            self.cells,
+            self.tile_size.p05,
+            self.tile_size.p95,
             100.0 * self.painted.covered as f64 / (size * size) as f64,
         )?;
-        if let Some(fitted) = &self.field.fitted {
-            writeln!(
-                f,
-                "  fitted across the cut: moved by at most {:.3} tiles, stretched by {:.1} % (RMS), closed to {:.0e} tiles",
-                fitted.largest_correction,
-                100.0 * fitted.stretch,
-                fitted.largest_misfit,
-            )?;
-        }
         let step = |step: Option<f64>| step.map_or("none".to_owned(), |s| format!("{s:.2}"));
         writeln!(
             f,
-            "  mean colour step over one texel, of 255: {} across the cut ({} beside it), {} across all seams ({} beside them), {} elsewhere",
+            "  mean colour step over two texels, of 255: {} where the grid turns ({} beside it), {} across seams ({} beside them)",
             step(self.steps.cut),
             step(self.steps.beside_cut),
             step(self.steps.seams),
             step(self.steps.beside_seams),
-            step(self.steps.inside),
         )
     }
 }

@@ -41,6 +41,15 @@ pub enum FolderError {
         /// What its reader said.
         problem: String,
     },
+    /// No grid, where one is needed.
+    #[error(
+        "{} has no grid: build with images.domain = \"grid\"; where that was set, no grid could be made, and the build's warning says why",
+        path.display()
+    )]
+    NoGrid {
+        /// `atlas.json`.
+        path: PathBuf,
+    },
     /// Another format, or a version that came later.
     #[error(
         "{} says format {format:?}, version {version}; this program reads \"affine-atlas\", versions 1 and 2",

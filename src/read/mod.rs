@@ -20,7 +20,7 @@
 //! | `obj`, `off`, `ply`, `stl` | one format each |
 //! | `gltf` | glTF 2.0 and GLB with its compression extensions |
 //! | `atlas` | images and seams of a folder that a build wrote |
-//! | `flat` | flat coordinates and patches of such a folder |
+//! | `gridded` | grid coordinates and patches of such a folder |
 //! | `metric` | flat lengths and cones of such a folder |
 //! | `npz`, `exr`, `bounded` | the formats in such a folder |
 //!
@@ -34,9 +34,9 @@ mod build;
 mod error;
 pub(crate) mod exr;
 mod fingerprint;
-pub mod flat;
 mod folder;
 mod gltf;
+pub mod gridded;
 pub mod metric;
 pub(crate) mod npz;
 mod obj;

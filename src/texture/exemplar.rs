@@ -1,15 +1,14 @@
-//! The exemplar: an image that repeats in both directions, and its mean over any square.
+//! The exemplar: an image that repeats in both directions, and its mean over any rectangle.
 //!
 //! *Enters:* an image file. *Leaves:* an [`Exemplar`], and how well it repeats and which turns it survives.
 //!
-//! Means are exact: sums over all pixels left of and above a point stand ready, so that a mean over a square costs four look-ups
-//! whatever its size. They are taken in linear light and weighted by opacity; over a square of one pixel the mean is bilinear
-//! interpolation.
+//! Means are exact: sums over all pixels left of and above a point stand ready, so that a mean over a rectangle costs four look-ups
+//! whatever its size. They are taken in linear light and weighted by opacity; over one pixel the mean is bilinear interpolation.
 
 use super::ExemplarError;
 use crate::export::pictures::colour::{to_bytes, to_linear};
 use crate::read::bounded::open_regular;
-use image::{ImageFormat, ImageReader, RgbaImage};
+use image::{ImageFormat, ImageReader, Rgba, RgbaImage};
 use std::io::BufReader;
 use std::path::Path;
 
@@ -19,6 +18,8 @@ const SIDE_LIMIT: u32 = 4096;
 const PARTS: f32 = 65535.0;
 /// Mean difference of channels (of 255) up to which an image counts as the same: what rounding to bytes does.
 const SAME: f64 = 1.0;
+/// Samples along a side of a tile that is looked at for its symmetry where the image is no square.
+const TILE: u32 = 256;
 
 /// An image that repeats.
 #[derive(Clone, Debug)]
@@ -45,11 +46,11 @@ impl Border {
     }
 }
 
-/// How an image changes when it is turned about its middle: mean differences of channels (of 255).
+/// How a tile changes when it is turned about its middle: mean differences of channels (of 255).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Symmetry {
-    /// By a quarter turn; `None` where it is no square.
-    pub quarter: Option<f64>,
+    /// By a quarter turn.
+    pub quarter: f64,
     /// By half a turn.
     pub half: f64,
 }
@@ -58,7 +59,7 @@ impl Symmetry {
     /// True where a quarter turn changes nothing.
     #[must_use]
     pub fn has_quarter(&self) -> bool {
-        self.quarter.is_some_and(|d| d <= SAME)
+        self.quarter <= SAME
     }
 
     /// True where half a turn changes nothing.
@@ -137,31 +138,25 @@ impl Exemplar {
         [self.image.width() as usize, self.image.height() as usize]
     }
 
-    /// Height over width.
-    #[must_use]
-    pub fn aspect(&self) -> f64 {
-        let [width, height] = self.size();
-        height as f64 / width as f64
-    }
-
     /// True where some pixel is not opaque.
     #[must_use]
     pub fn is_transparent(&self) -> bool {
         self.image.pixels().any(|p| p.0[3] != 255)
     }
 
-    /// Mean over a square around a point of the repeating image: the point and the square's side in widths of the tile, x to the right and y
-    /// up from the image's lower left corner; a side of less than a pixel counts as one. Linear light times opacity, and opacity, 0 to 1.
+    /// Mean over a rectangle around a point of the repeating image: the point and the sides in repeats, x to the right in widths of the image and y
+    /// up in heights from its lower left corner; a side of less than a pixel counts as one. Linear light times opacity, and opacity, 0 to 1.
     #[must_use]
-    pub fn mean(&self, at: [f64; 2], side: f64) -> [f64; 4] {
+    pub fn mean(&self, at: [f64; 2], sides: [f64; 2]) -> [f64; 4] {
         let size = self.size().map(|n| n as f64);
-        let side = (side * size[0]).max(1.0);
-        let middle = [at[0] * size[0], size[1] - at[1] * size[0]];
-        let low: [f64; 2] = std::array::from_fn(|i| (middle[i] - 0.5 * side).rem_euclid(size[i]));
+        let [width, height]: [f64; 2] = std::array::from_fn(|i| (sides[i] * size[i]).max(1.0));
+        let middle = [at[0] * size[0], (1.0 - at[1]) * size[1]];
+        let low = [middle[0] - 0.5 * width, middle[1] - 0.5 * height];
+        let low: [f64; 2] = std::array::from_fn(|i| low[i].rem_euclid(size[i]));
         let [x0, y0] = low.map(|x| if x.is_finite() { x } else { 0.0 });
-        let [x1, y1] = [x0 + side, y0 + side];
+        let [x1, y1] = [x0 + width, y0 + height];
         let [a, b, c, d] = [[x1, y1], [x0, y1], [x1, y0], [x0, y0]].map(|p| self.sum(p));
-        let scale = 1.0 / (255.0 * side * side);
+        let scale = 1.0 / (255.0 * width * height);
         std::array::from_fn(|i| {
             let part = if i < 3 {
                 scale / f64::from(PARTS)
@@ -219,17 +214,30 @@ impl Exemplar {
         }
     }
 
-    /// See [`Symmetry`].
+    /// How a tile of so many copies across and down changes when it is turned; one copy is stretched to a square.
     #[must_use]
-    pub fn symmetry(&self) -> Symmetry {
+    pub fn symmetry(&self, copies: [u32; 2]) -> Symmetry {
         let (width, height) = self.image.dimensions();
-        let all = || (0..height).flat_map(move |y| (0..width).map(move |x| (x, y)));
-        let half = all().map(|(x, y)| [(x, y), (width - 1 - x, height - 1 - y)]);
-        let quarter = all().map(|(x, y)| [(x, y), (y, width - 1 - x)]);
+        let all = |width, height| (0..height).flat_map(move |y| (0..width).map(move |x| (x, y)));
+        let half = all(width, height).map(|(x, y)| [(x, y), (width - 1 - x, height - 1 - y)]);
+        let sampled = (width != height).then(|| self.tile(copies));
+        let tile = sampled.as_ref().unwrap_or(&self.image);
+        let side = tile.width();
+        let quarter = all(side, side).map(|(x, y)| [(x, y), (y, side - 1 - x)]);
         Symmetry {
-            quarter: (width == height).then(|| difference(quarter, &self.image)),
+            quarter: difference(quarter, tile),
             half: difference(half, &self.image),
         }
+    }
+
+    /// A square of so many copies across and down.
+    fn tile(&self, copies: [u32; 2]) -> RgbaImage {
+        let part = copies.map(|n| f64::from(n) / f64::from(TILE));
+        RgbaImage::from_fn(TILE, TILE, |x, y| {
+            let place = [x, TILE - 1 - y].map(|k| f64::from(k) + 0.5);
+            let at = std::array::from_fn(|i| part[i] * place[i]);
+            Rgba(to_pixel(self.mean(at, part)))
+        })
     }
 }
 
@@ -256,7 +264,6 @@ pub(super) fn to_pixel(mean: [f64; 4]) -> [u8; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::Rgba;
 
     fn noise(width: u32, height: u32) -> RgbaImage {
         let mut state = 5u64;
@@ -278,10 +285,10 @@ mod tests {
             for shift in [[0.0, 0.0], [-3.0, 2.0], [1000.0, -77.0]] {
                 let at = [
                     (f64::from(x) + 0.5) / 7.0 + shift[0],
-                    (4.5 - f64::from(y)) / 7.0 + shift[1] * exemplar.aspect(),
+                    (4.5 - f64::from(y)) / 5.0 + shift[1],
                 ];
                 assert_eq!(
-                    to_pixel(exemplar.mean(at, 0.0)),
+                    to_pixel(exemplar.mean(at, [0.0; 2])),
                     pixel.0,
                     "{x} {y} {shift:?}"
                 );
@@ -290,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn means_over_large_squares_are_those_of_all_pixels() {
+    fn means_over_large_rectangles_are_those_of_all_pixels() {
         let image = noise(6, 6);
         let exemplar = Exemplar::new(image.clone());
         let mut mean = [0.0; 3];
@@ -300,17 +307,17 @@ mod tests {
                 *sum += f64::from(c) / 36.0;
             }
         }
-        for side in [1.0, 5.0] {
-            let found = exemplar.mean([0.37, 0.91], side);
+        for sides in [[1.0, 1.0], [5.0, 5.0], [2.0, 3.0]] {
+            let found = exemplar.mean([0.37, 0.91], sides);
             for i in 0..3 {
                 assert!(
                     (found[i] - mean[i]).abs() < 1e-5,
-                    "{side}: {found:?} {mean:?}"
+                    "{sides:?}: {found:?} {mean:?}"
                 );
             }
         }
         // Two pixels and two halves of pixels.
-        let quarter = exemplar.mean([2.5 / 6.0, 2.5 / 6.0], 2.0 / 6.0);
+        let quarter = exemplar.mean([2.5 / 6.0, 2.5 / 6.0], [2.0 / 6.0; 2]);
         let mut expected = 0.0;
         for (x, s) in [(1, 0.5), (2, 1.0), (3, 0.5)] {
             for (y, t) in [(2, 0.5), (3, 1.0), (4, 0.5)] {
@@ -330,7 +337,7 @@ mod tests {
         let exemplar = Exemplar::new(image);
         assert!(exemplar.is_transparent());
         assert_eq!(
-            to_pixel(exemplar.mean([0.5, 0.25], 1.0)),
+            to_pixel(exemplar.mean([0.5, 0.5], [1.0; 2])),
             [200, 10, 10, 128]
         );
     }
@@ -347,15 +354,22 @@ mod tests {
         assert!(!slope.border().repeats());
         assert_eq!(slope.border().across, [0.75 * 210.0, 0.0]);
         assert_eq!(slope.border().inside, [0.75 * 30.0, 0.0]);
-        assert!(!slope.symmetry().has_half() && !slope.symmetry().has_quarter());
+        assert!(!slope.symmetry([1, 1]).has_half() && !slope.symmetry([1, 1]).has_quarter());
         // Squares of a checkerboard have edges inside that are as sharp as those between tiles.
         let board = ramp(&|x, y| if (x / 4 + y / 4) % 2 == 0 { 255 } else { 0 });
         assert!(board.border().repeats());
-        assert!(board.symmetry().has_half() && !board.symmetry().has_quarter());
+        assert!(board.symmetry([1, 1]).has_half() && !board.symmetry([1, 1]).has_quarter());
         let frame = ramp(&|x, y| (20 * (x.min(7 - x)).min(y.min(7 - y))) as u8);
-        assert!(frame.symmetry().has_quarter() && frame.border().repeats());
-        let wide = Exemplar::new(noise(4, 2));
-        assert_eq!(wide.symmetry().quarter, None);
+        assert!(frame.symmetry([1, 1]).has_quarter() && frame.border().repeats());
+        // No square: stretched to one, or twice in one.
+        let wide = RgbaImage::from_fn(8, 4, |x, y| {
+            let c = (40 * (x / 2).min((7 - x) / 2) + 40 * y.min(3 - y)) as u8;
+            Rgba([c, c, c, 255])
+        });
+        let wide = Exemplar::new(wide);
+        assert!(wide.symmetry([1, 1]).has_half() && !wide.symmetry([1, 2]).has_quarter());
+        let plain = Exemplar::new(RgbaImage::from_pixel(4, 2, Rgba([9, 90, 200, 255])));
+        assert!(plain.symmetry([1, 2]).has_quarter());
         assert!(noise(1, 1).width() == 1 && Exemplar::new(noise(1, 1)).border().repeats());
     }
 }

@@ -1,25 +1,24 @@
 //! The texture: every texel of the packed square in the colour of the exemplar at its place.
 //!
-//! *Enters:* a surface, tile coordinates and an exemplar. *Leaves:* a [`Painted`] square.
+//! *Enters:* a surface with its grid, a tiling and an exemplar. *Leaves:* a [`Painted`] square.
 //!
-//! *Guaranteed:* a texel whose centre lies in a patch holds the mean of the exemplar over the texel as it lies on the tile, in linear
-//! light (bilinear interpolation where the texel is smaller than a pixel). Outside, the pattern goes on over [`MARGIN`] texels, as the
+//! *Guaranteed:* a texel whose centre lies in a patch holds the mean of the exemplar over the texel as it lies on the grid, in linear
+//! light (bilinear interpolation where the texel is smaller than a pixel). Patches lie in the square as on the grid but for scale, quarter turns and
+//! translations, so that texels are squares along the grid's axes. Outside, the pattern goes on over [`MARGIN`] texels, as the
 //! nearest texel in a patch has it, and beyond that its colour is repeated: neither bilinear filtering nor smaller copies see what lies
 //! between patches. The same for any number of threads.
 
 use super::exemplar::{Exemplar, to_pixel};
-use super::field::Field;
-use super::gaussian::Complex;
+use super::tiling::Tiling;
 use crate::atlas::geometry_image::nearest_sources;
 use crate::atlas::raster::cover;
 use crate::geometry::ids::NONE;
-use crate::read::flat::FlatSurface;
+use crate::grid::complex::turned;
+use crate::read::gridded::GriddedSurface;
 use rayon::prelude::*;
 
 /// Texels outside a patch over which its pattern goes on.
 pub const MARGIN: f64 = 4.0;
-/// Most samples along a side of a texel that is larger than a pixel; below, one for each pixel.
-const SAMPLES: usize = 4;
 
 /// A square of texels, row 0 at the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,7 +56,7 @@ impl Painted {
 }
 
 /// Corners of a face in a square of that many texels.
-pub(super) fn in_texels(surface: &FlatSurface, face: usize, size: usize) -> [[f64; 2]; 3] {
+pub(super) fn in_texels(surface: &GriddedSurface, face: usize, size: usize) -> [[f64; 2]; 3] {
     let size = size as f64;
     surface
         .packed(face)
@@ -66,14 +65,19 @@ pub(super) fn in_texels(surface: &FlatSurface, face: usize, size: usize) -> [[f6
 
 /// Paints a square of `size` × `size` texels, at least one.
 #[must_use]
-pub fn paint(surface: &FlatSurface, field: &Field, exemplar: &Exemplar, size: usize) -> Painted {
+pub fn paint(
+    surface: &GriddedSurface,
+    tiling: &Tiling,
+    exemplar: &Exemplar,
+    size: usize,
+) -> Painted {
     let size = size.max(1);
     let face_of = owners(surface, size);
     let sources: Vec<bool> = face_of.iter().map(|&f| f != NONE).collect();
     let nearest = nearest_sources(&sources, size);
     let brush = Brush {
         surface,
-        field,
+        tiling,
         exemplar,
         size,
     };
@@ -87,7 +91,7 @@ pub fn paint(surface: &FlatSurface, field: &Field, exemplar: &Exemplar, size: us
         match face_of[source] {
             NONE => [0; 4],
             _ if !is_near(at) => [0; 4],
-            face => brush.texel(face as usize, centre(source), centre(at)),
+            face => brush.texel(face as usize, centre(at)),
         }
     });
     let near: Vec<[u8; 4]> = near.collect();
@@ -102,7 +106,7 @@ pub fn paint(surface: &FlatSurface, field: &Field, exemplar: &Exemplar, size: us
 
 /// The face that each texel centre lies in, the lowest of several; [`NONE`] outside. A patch without any texel centre gets one texel all the
 /// same where it is free.
-fn owners(surface: &FlatSurface, size: usize) -> Vec<u32> {
+fn owners(surface: &GriddedSurface, size: usize) -> Vec<u32> {
     let mut face_of = vec![NONE; size * size];
     let mut is_seen = vec![false; surface.patches.len()];
     for face in 0..surface.faces.len() {
@@ -128,78 +132,23 @@ fn owners(surface: &FlatSurface, size: usize) -> Vec<u32> {
 }
 
 struct Brush<'a> {
-    surface: &'a FlatSurface,
-    field: &'a Field,
+    surface: &'a GriddedSurface,
+    tiling: &'a Tiling,
     exemplar: &'a Exemplar,
     size: usize,
 }
 
 impl Brush<'_> {
-    /// The colour at a place near a texel centre `from` that belongs to a face.
-    fn texel(&self, face: usize, from: [f64; 2], place: [f64; 2]) -> [u8; 4] {
-        let corners = in_texels(self.surface, face, self.size);
-        let values = self.field.corners[face].map(Complex::point);
-        let steps = self.steps(face, corners, values);
-        let weights = barycentric(corners, from);
-        let base = (0..3).fold(Complex::ZERO, |sum, k| sum + values[k].scaled(weights[k]));
-        let middle =
-            base + steps[0].scaled(place[0] - from[0]) + steps[1].scaled(place[1] - from[1]);
-        let side = steps[0].length().max(steps[1].length());
-        let pixels = side * self.exemplar.size()[0] as f64;
-        if pixels <= 1.0 {
-            return to_pixel(self.exemplar.mean(middle.coordinates(), side));
-        }
-        let count = (pixels.ceil() as usize).min(SAMPLES);
-        let part = 1.0 / count as f64;
-        let offset = |k: usize| (k as f64 + 0.5) * part - 0.5;
-        let mut sum = [0.0; 4];
-        for i in 0..count {
-            for j in 0..count {
-                let at = middle + steps[0].scaled(offset(i)) + steps[1].scaled(offset(j));
-                let mean = self.exemplar.mean(at.coordinates(), side * part);
-                for (sum, c) in sum.iter_mut().zip(mean) {
-                    *sum += part * part * c;
-                }
-            }
-        }
-        to_pixel(sum)
-    }
-
-    /// How tile coordinates change from texel to texel to the right and down. In a flat patch that is one similarity: faces without
-    /// area, of which it could not be told, have it too.
-    fn steps(&self, face: usize, corners: [[f64; 2]; 3], values: [Complex; 3]) -> [Complex; 2] {
-        let patch = &self.surface.patches[self.surface.patch[face] as usize];
-        if let Some(to_chart) = patch.to_chart {
-            let length = to_chart.scale / (patch.packed_scale * self.size as f64);
-            let turn = Complex::new(to_chart.rotation.cos(), to_chart.rotation.sin());
-            let right = self.field.scale * turn.scaled(length);
-            return [right, right * Complex::quarter_turns(3)];
-        }
-        let [a, b] = [1, 2].map(|k| [corners[k][0] - corners[0][0], corners[k][1] - corners[0][1]]);
-        let [p, q] = [1, 2].map(|k| values[k] - values[0]);
-        let det = a[0] * b[1] - a[1] * b[0];
-        let steps = [
-            (p.scaled(b[1]) - q.scaled(a[1])).scaled(1.0 / det),
-            (q.scaled(a[0]) - p.scaled(b[0])).scaled(1.0 / det),
-        ];
-        // A texel that spans the surface has its mean colour; so has one on a face without area.
-        match steps.iter().all(|s| s.length() < 1e3) {
-            true => steps,
-            false => [Complex::new(1e3, 0.0), Complex::new(0.0, 1e3)],
-        }
-    }
-}
-
-/// Weights of a triangle's corners at a point, held to the triangle; the same for all corners where it has no area.
-fn barycentric(t: [[f64; 2]; 3], p: [f64; 2]) -> [f64; 3] {
-    let area =
-        |a: [f64; 2], b: [f64; 2]| (a[0] - p[0]) * (b[1] - p[1]) - (a[1] - p[1]) * (b[0] - p[0]);
-    let parts = [area(t[1], t[2]), area(t[2], t[0]), area(t[0], t[1])];
-    let sum: f64 = parts.iter().sum();
-    let held = parts.map(|x| (x / sum).max(0.0));
-    let total: f64 = held.iter().sum();
-    match total.is_finite() && total > 0.0 {
-        true => held.map(|x| x / total),
-        false => [1.0 / 3.0; 3],
+    /// The colour of the texel around a place in or near a face.
+    fn texel(&self, face: usize, place: [f64; 2]) -> [u8; 4] {
+        let surface = self.surface;
+        let packing = surface.patches[surface.patch[face] as usize];
+        let side = 1.0 / (packing.scale * self.size as f64);
+        let [corner, ..] = in_texels(surface, face, self.size);
+        let from_corner = [side * (place[0] - corner[0]), side * (corner[1] - place[1])];
+        let [x, y] = turned(from_corner, surface.patch_turns[face]);
+        let [[u, v], ..] = surface.grid_uv[face];
+        let at = self.tiling.repeats([u + x, v + y]);
+        to_pixel(self.exemplar.mean(at, self.tiling.repeats([side; 2])))
     }
 }

@@ -1,176 +1,222 @@
-//! How much the colour changes across seams, beside how much it changes anywhere.
+//! How much the colour changes across seams, beside how much it changes right beside them.
 //!
-//! *Enters:* a painted surface. *Leaves:* [`Steps`]: mean differences of channels (of 255) between two points at the same flat distance,
-//! one texel of mean size, on the two sides of edges that are cut, of edges where patches end, and of all others.
+//! *Enters:* a painted surface. *Leaves:* [`Steps`]: mean differences of channels (of 255) between pairs of points two texels apart.
 //!
-//! Points are looked up in the texture as a viewer would, half the distance to each side of an edge along its length. A pattern is not
-//! equally varied everywhere, least of all at cones, where its centres lie: so seams are also compared with pairs of points of the
-//! same direction right beside them, half the distance and one and a half from the edge.
+//! Points are looked up in the texture as a viewer would. A pair across an edge has one point half a texel on one side and the other one and a
+//! half on the other side, both ways: pairs at the same distance from an edge would find nothing where it is a mirror of the pattern, as
+//! borders of tiles often are. A pattern is not equally varied everywhere, and edges of patches are borders of tiles: so the
+//! same pairs are also looked up one whole tile farther into the patch, on either side, where the pattern is the same. Places whose neighbours one tile away
+//! lie in no patch of theirs are left out of both.
 
-use super::field::flat_area;
-use super::paint::{Painted, in_texels};
+use super::paint::Painted;
+use super::tiling::Tiling;
 use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{HalfedgeId, NONE};
-use crate::read::flat::FlatSurface;
+use crate::geometry::ids::HalfedgeId;
+use crate::read::gridded::{GriddedSurface, Packing};
+
+/// Distances of the two points of a pair from the edge, texels: the first outside, the second inside.
+const PAIR: [f64; 2] = [-0.5, 1.5];
+
+/// Most places along an edge.
+const MOST_PLACES: f64 = 1e4;
 
 /// Mean differences, `None` where there is no such edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Steps {
-    /// Across the cut.
+    /// Across edges where frames of the grid turn: there a pattern jumps that changes when it is turned.
     pub cut: Option<f64>,
-    /// Right beside the cut, on either side.
+    /// Right beside these, on either side.
     pub beside_cut: Option<f64>,
-    /// Wherever texture coordinates jump: the cut, and where patches end without it.
+    /// Across edges where texture coordinates jump.
     pub seams: Option<f64>,
     /// Right beside these, on either side.
     pub beside_seams: Option<f64>,
-    /// Across all other edges.
-    pub inside: Option<f64>,
-    /// Distance between the two points, flat units.
-    pub distance: f64,
 }
 
-struct Mean {
-    sum: f64,
+/// Differences across edges of one kind and beside them.
+#[derive(Clone, Copy, Default)]
+struct Means {
+    across: f64,
+    beside: f64,
     length: f64,
 }
 
-impl Mean {
-    const ZERO: Mean = Mean {
-        sum: 0.0,
-        length: 0.0,
-    };
-
-    fn add(&mut self, value: f64, length: f64) {
-        self.sum += value * length;
-        self.length += length;
+impl Means {
+    fn add(&mut self, other: Means) {
+        self.across += other.across;
+        self.beside += other.beside;
+        self.length += other.length;
     }
 
-    fn value(&self) -> Option<f64> {
-        (self.length > 0.0).then(|| self.sum / self.length)
+    fn values(&self) -> [Option<f64>; 2] {
+        [self.across, self.beside].map(|x| (self.length > 0.0).then(|| x / self.length))
     }
 }
 
 /// Measures a painted surface.
 #[must_use]
-pub fn steps(surface: &FlatSurface, connectivity: &Connectivity, painted: &Painted) -> Steps {
-    let distance = (flat_area(surface) / painted.covered.max(1) as f64).sqrt();
-    let [
-        mut cut,
-        mut beside_cut,
-        mut seams,
-        mut beside_seams,
-        mut inside,
-    ] = [const { Mean::ZERO }; 5];
+pub fn steps(
+    surface: &GriddedSurface,
+    connectivity: &Connectivity,
+    tiling: &Tiling,
+    painted: &Painted,
+) -> Steps {
+    let viewer = Viewer {
+        surface,
+        painted,
+        ranges: ranges(surface),
+        tile: 1.0 / f64::from(tiling.tiles_per_cell),
+    };
+    let (mut cut, mut seams) = (Means::default(), Means::default());
     for e in connectivity.edges() {
         let h = connectivity.edge_halfedge(e);
         let Some(twin) = connectivity.twin(h) else {
             continue;
         };
-        let sides = [(h, false), (twin, true)]
-            .map(|(h, reversed)| Side::new(surface, connectivity, h, reversed, painted.size));
-        let [Some(left), Some(right)] = sides else {
-            continue;
-        };
-        let count = (left.length / distance).ceil().clamp(1.0, 1e4) as usize;
-        let (mut sum, mut sum_beside) = (0.0, 0.0);
-        for k in 0..count {
-            let t = (k as f64 + 0.5) / count as f64;
-            let near = [&left, &right].map(|side| painted.at(side.place(t, 0.5 * distance)));
-            let far = [&left, &right].map(|side| painted.at(side.place(t, 1.5 * distance)));
-            sum += difference(near[0], near[1]);
-            sum_beside += 0.5 * (difference(near[0], far[0]) + difference(near[1], far[1]));
-        }
-        let [mean, beside] = [sum, sum_beside].map(|x| x / count as f64);
-        let length = left.length;
         let (f, corner) = (connectivity.face(h).index(), connectivity.corner(h));
-        if surface.segment[f][(corner + 2) % 3] != NONE {
-            cut.add(mean, length);
-            beside_cut.add(beside, length);
-            seams.add(mean, length);
-            beside_seams.add(beside, length);
-        } else if left.is_apart(&right) {
-            seams.add(mean, length);
-            beside_seams.add(beside, length);
-        } else {
-            inside.add(mean, length);
+        let is_cut = surface.turns[f][(corner + 2) % 3] != 0;
+        let left = Side::new(surface, connectivity, h);
+        let right = Side::new(surface, connectivity, twin).reversed();
+        let is_seam = viewer.is_apart(&left, &right);
+        if is_cut || is_seam {
+            let found = viewer.along([left, right]);
+            if is_cut {
+                cut.add(found);
+            }
+            if is_seam {
+                seams.add(found);
+            }
         }
     }
+    let ([cut, beside_cut], [seams, beside_seams]) = (cut.values(), seams.values());
     Steps {
-        cut: cut.value(),
-        beside_cut: beside_cut.value(),
-        seams: seams.value(),
-        beside_seams: beside_seams.value(),
-        inside: inside.value(),
-        distance,
+        cut,
+        beside_cut,
+        seams,
+        beside_seams,
     }
 }
 
-/// Where the inward normal of a side of a face, one flat unit long, comes to lie in a texture that is no similar copy of the chart. The side and
-/// the third corner are given as corners.
-fn straight_in(
-    [from, to, apex]: [usize; 3],
-    texels: [[f64; 2]; 3],
-    chart: [[f64; 2]; 3],
-) -> [f64; 2] {
-    let span = |p: [[f64; 2]; 3], k: usize| [p[k][0] - p[from][0], p[k][1] - p[from][1]];
-    let (side, rise) = (span(chart, to), span(chart, apex));
-    let squared = side[0] * side[0] + side[1] * side[1];
-    let height = (side[0] * rise[1] - side[1] * rise[0]) / squared.sqrt();
-    let foot = (side[0] * rise[0] + side[1] * rise[1]) / squared;
-    let (side, rise) = (span(texels, to), span(texels, apex));
-    std::array::from_fn(|i| (rise[i] - foot * side[i]) / height)
+/// Least and greatest coordinates of every patch.
+fn ranges(surface: &GriddedSurface) -> Vec<[[f64; 2]; 2]> {
+    let mut ranges = vec![[[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]]; surface.patches.len()];
+    for (&patch, corners) in surface.patch.iter().zip(&surface.patch_uv) {
+        let [low, high] = &mut ranges[patch as usize];
+        for p in corners {
+            *low = std::array::from_fn(|i| low[i].min(p[i]));
+            *high = std::array::from_fn(|i| high[i].max(p[i]));
+        }
+    }
+    ranges
 }
 
-/// Mean difference of the channels.
-fn difference(a: [f64; 4], b: [f64; 4]) -> f64 {
-    (0..4).map(|i| (a[i] - b[i]).abs()).sum::<f64>() / 4.0
+/// Looks up colours at places of patches.
+struct Viewer<'a> {
+    surface: &'a GriddedSurface,
+    painted: &'a Painted,
+    ranges: Vec<[[f64; 2]; 2]>,
+    /// Side of a tile, cells.
+    tile: f64,
 }
 
-/// An edge as one of its faces has it in the texture.
+impl Viewer<'_> {
+    fn in_texels(&self, patch: u32, p: [f64; 2]) -> [f64; 2] {
+        let Packing { scale, translation } = self.surface.patches[patch as usize];
+        let [u, v]: [f64; 2] = std::array::from_fn(|i| scale * p[i] + translation[i]);
+        let size = self.painted.size as f64;
+        [size * u, size * (1.0 - v)]
+    }
+
+    /// Side of a texel, cells.
+    fn texel(&self, side: &Side) -> f64 {
+        let packing = self.surface.patches[side.patch as usize];
+        1.0 / (packing.scale * self.painted.size as f64)
+    }
+
+    /// True where the two faces have the edge at different places of the texture.
+    fn is_apart(&self, left: &Side, right: &Side) -> bool {
+        let is_far = |k: usize| {
+            let [[a, b], [c, d]] =
+                [left, right].map(|side| self.in_texels(side.patch, side.ends[k]));
+            (a - c).hypot(b - d) > 1e-3
+        };
+        left.patch != right.patch || is_far(0) || is_far(1)
+    }
+
+    /// The mean difference of the channels at two places.
+    fn difference(&self, places: [(u32, [f64; 2]); 2]) -> f64 {
+        let [a, b] = places.map(|(patch, p)| self.painted.at(self.in_texels(patch, p)));
+        (0..4).map(|i| (a[i] - b[i]).abs()).sum::<f64>() / 4.0
+    }
+
+    /// Across an edge and beside it.
+    fn along(&self, [left, right]: [Side; 2]) -> Means {
+        let texel = self.texel(&left).max(self.texel(&right));
+        let count = (left.length / texel).ceil().clamp(1.0, MOST_PLACES);
+        let mut means = Means::default();
+        for k in 0..count as usize {
+            let t = (k as f64 + 0.5) / count;
+            let (mut across, mut beside, mut sides) = (0.0, 0.0, 0.0);
+            for (side, other) in [(&left, &right), (&right, &left)] {
+                let near = other.place(t, -PAIR[0] * texel);
+                let far = side.place(t, PAIR[1] * texel);
+                across += 0.5 * self.difference([(other.patch, near), (side.patch, far)]);
+                let moved =
+                    PAIR.map(|inwards| side.tile_away(side.place(t, inwards * texel), self.tile));
+                let [low, high] = self.ranges[side.patch as usize];
+                if moved
+                    .iter()
+                    .all(|p| (0..2).all(|i| (low[i]..=high[i]).contains(&p[i])))
+                {
+                    beside += self.difference(moved.map(|p| (side.patch, p)));
+                    sides += 1.0;
+                }
+            }
+            if sides > 0.0 {
+                means.add(Means {
+                    across: left.length / count * across,
+                    beside: left.length / count * beside / sides,
+                    length: left.length / count,
+                });
+            }
+        }
+        means
+    }
+}
+
+/// An edge as one of its faces has it in its patch.
 struct Side {
-    ends: [[f64; 2]; 2],
-    /// Into the face, texels a flat unit.
-    inwards: [f64; 2],
     patch: u32,
-    /// Flat length.
+    ends: [[f64; 2]; 2],
+    /// Into the face, of length 1.
+    inwards: [f64; 2],
+    /// Cells.
     length: f64,
 }
 
 impl Side {
-    /// From the tail of the halfedge to its head, or the other way round. `None` where the edge has no length.
-    fn new(
-        surface: &FlatSurface,
-        connectivity: &Connectivity,
-        h: HalfedgeId,
-        reversed: bool,
-        size: usize,
-    ) -> Option<Self> {
+    /// From the tail of the halfedge to its head.
+    fn new(surface: &GriddedSurface, connectivity: &Connectivity, h: HalfedgeId) -> Self {
         let (face, corner) = (connectivity.face(h).index(), connectivity.corner(h));
-        let (from, to) = (corner, (corner + 1) % 3);
-        let texels = in_texels(surface, face, size);
-        let chart = surface.central_uv[face];
-        let span = |p: &[[f64; 2]; 3]| [p[to][0] - p[from][0], p[to][1] - p[from][1]];
-        let (along, flat) = (span(&texels), span(&chart));
-        let (texel_length, length) = (along[0].hypot(along[1]), flat[0].hypot(flat[1]));
-        let inwards = match surface.patches[surface.patch[face] as usize].to_chart {
-            // Rows run down, so that the left of the halfedge is on its right here.
-            Some(_) => [along[1], -along[0]].map(|x| x / length),
-            None => straight_in([from, to, (corner + 2) % 3], texels, chart),
-        };
-        let ends = if reversed {
-            [texels[to], texels[from]]
-        } else {
-            [texels[from], texels[to]]
-        };
-        (texel_length > 0.0 && length > 0.0 && inwards.iter().all(|x| x.is_finite())).then_some(
-            Self {
-                ends,
-                inwards,
-                patch: surface.patch[face],
-                length,
-            },
-        )
+        let corners = surface.patch_uv[face];
+        let ends = [corners[corner], corners[(corner + 1) % 3]];
+        let [x, y] = [ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]];
+        let length = x.hypot(y);
+        Self {
+            patch: surface.patch[face],
+            ends,
+            inwards: [-y / length, x / length],
+            length,
+        }
+    }
+
+    /// The other way round.
+    fn reversed(self) -> Self {
+        let [a, b] = self.ends;
+        Self {
+            ends: [b, a],
+            ..self
+        }
     }
 
     fn place(&self, t: f64, inwards: f64) -> [f64; 2] {
@@ -178,12 +224,12 @@ impl Side {
         std::array::from_fn(|i| a[i] + t * (b[i] - a[i]) + inwards * self.inwards[i])
     }
 
-    /// True where the two faces have the edge at different places.
-    fn is_apart(&self, other: &Side) -> bool {
-        let far = |k: usize| {
-            let [a, b] = [self.ends[k], other.ends[k]];
-            (a[0] - b[0]).hypot(a[1] - b[1]) > 1e-3
-        };
-        self.patch != other.patch || far(0) || far(1)
+    /// Moved by one tile along the axis that is nearest to the way into the face.
+    fn tile_away(&self, p: [f64; 2], tile: f64) -> [f64; 2] {
+        let [x, y] = self.inwards;
+        match x.abs() > y.abs() {
+            true => [p[0] + tile.copysign(x), p[1]],
+            false => [p[0], p[1] + tile.copysign(y)],
+        }
     }
 }
