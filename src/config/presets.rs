@@ -40,10 +40,8 @@ impl Preset {
     #[must_use]
     pub fn settings(self) -> &'static str {
         match self {
-            // Four times the default: a knot interval takes four sample steps, so that the splines' error is about half.
-            Self::SplineFit => {
-                "[images]\ndomain = \"rectangle\"\n[patches]\ntexel_budget = 1048576\n"
-            }
+            // A knot interval takes four sample steps: four of them a side of a cell.
+            Self::SplineFit => "[images]\ndomain = \"grid\"\n[grid]\nsamples_per_cell = 16\n",
             // More cones vary less in scale, and one texel of padding is what bilinear interpolation needs: at so few texels each counts.
             Self::GeometryImage256 => {
                 "[cones]\ncount = 16\n[images]\ndomain = \"flat\"\nchannels = [\"normal\"]\n[patches]\n\
