@@ -575,7 +575,7 @@ fn help() {
       cones    Show what more or fewer cones gain, and write lists of them
       verify   Read atlases back and check every property they must have
       rebuild  Make a mesh again from the geometry images of an atlas
-      fit      Fit spline surfaces to the images of rectangles
+      fit      Fit spline surfaces to the images of a grid
       texture  Lay a repeating image over the whole surface as one texture
       explain  Say in plain words why an asset failed, or where it is distorted
       schema   Print a JSON schema of what is written, or of the configuration

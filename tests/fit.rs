@@ -5,11 +5,10 @@
 
 mod real_models;
 
-use affine_atlas::config::Config;
 use affine_atlas::fit::DEFAULT_SPACING;
-use affine_atlas::job::fit::{FitParams, FittedComponent};
+use affine_atlas::job::fit::{FitParams, FittedAsset};
 use affine_atlas::outcome::AssetState;
-use affine_atlas::{atlas::patches::Domain, job};
+use affine_atlas::{config, job};
 use libtest_mimic::{Arguments, Failed, Trial};
 use real_models::LARGE;
 use std::ffi::OsString;
@@ -59,11 +58,10 @@ fn has_scipy() -> bool {
     output.is_ok_and(|output| output.status.success())
 }
 
-/// A folder of rectangles and its surfaces.
-fn fitted(model: &Path, folder: &Path, spacing: f64) -> Result<FittedComponent, Failed> {
-    let mut config = Config::default();
-    config.images.domain = Domain::Rectangle;
-    config.pictures.enabled = false;
+/// A folder of a grid and its surfaces.
+fn fitted(model: &Path, folder: &Path, spacing: f64) -> Result<FittedAsset, Failed> {
+    let settings = ["images.domain=grid", "pictures.enabled=false"].map(str::to_owned);
+    let config = config::parse("settings", "", &settings)?;
     let outcome = job::run(model, "model", folder, "asset", &config, &());
     if outcome.state != AssetState::Built {
         return Err(format!("{:?}", outcome.state).into());
@@ -72,9 +70,9 @@ fn fitted(model: &Path, folder: &Path, spacing: f64) -> Result<FittedComponent, 
         spacing,
         ..FitParams::default()
     };
-    let mut asset = job::fit::fit(&folder.join("asset"), &params)?;
+    let asset = job::fit::fit(&folder.join("asset"), &params)?;
     match asset.components.len() {
-        1 => Ok(asset.components.remove(0)),
+        1 => Ok(asset),
         n => Err(format!("{n} components").into()),
     }
 }
@@ -82,7 +80,8 @@ fn fitted(model: &Path, folder: &Path, spacing: f64) -> Result<FittedComponent, 
 /// No gap, the right topology, and a surface that is the model's.
 fn joined(model: &Path, euler: i64) -> Result<(), Failed> {
     let folder = tempfile::tempdir()?;
-    let component = fitted(model, folder.path(), DEFAULT_SPACING)?;
+    let asset = fitted(model, folder.path(), DEFAULT_SPACING)?;
+    let component = &asset.components[0];
     let neighbours = &component.surfaces.neighbours;
     let measured = &component.measured;
     print!("{}", component);
@@ -98,14 +97,17 @@ fn joined(model: &Path, euler: i64) -> Result<(), Failed> {
     }
 }
 
-/// SciPy fits each image for itself with the same knots, and so gets the least that can be: ours may be no nearer, and not much farther. It reads
+/// SciPy fits each part for itself with the same knots, and so gets the least that can be: ours may be no nearer, and not much farther. It reads
 /// the images as they are, so they are grids without holes.
 fn beside_scipy() -> Result<(), Failed> {
     let folder = tempfile::tempdir()?;
-    let component = fitted(Path::new(FIXTURE), folder.path(), 3.0)?;
+    let asset = fitted(Path::new(FIXTURE), folder.path(), 3.0)?;
+    asset.write(folder.path(), "splines")?;
+    let component = &asset.components[0];
     let output = Command::new(python())
-        .arg("fixtures/fit_rectangles.py")
+        .arg("fixtures/fit_parts.py")
         .arg(folder.path().join("asset"))
+        .arg(folder.path().join("splines"))
         .arg("3")
         .output()?;
     let said = String::from_utf8_lossy(&output.stderr);
@@ -115,7 +117,7 @@ fn beside_scipy() -> Result<(), Failed> {
     let text = String::from_utf8(output.stdout)?;
     let ours = &component.measured.patches;
     if text.lines().count() != ours.len() {
-        return Err(format!("{} patches, but SciPy printed {text}", ours.len()).into());
+        return Err(format!("{} parts, but SciPy printed {text}", ours.len()).into());
     }
     let (mut squares, mut least, mut samples) = (0.0, 0.0, 0.0);
     for (id, line) in text.lines().enumerate() {
@@ -125,9 +127,12 @@ fn beside_scipy() -> Result<(), Failed> {
         };
         let size: [usize; 2] = [columns.parse()?, rows.parse()?];
         let rms: f64 = rms.parse()?;
-        let grid = &component.grids.patches[id].lattice;
+        let grid = &component.grids.patches[id];
         let error = ours[id].samples.rms;
-        if name != format!("{id:04}.exr") || size != grid.samples || error < rms * (1.0 - 1e-6) {
+        if name != format!("images/{:04}.exr", grid.part.block)
+            || size != grid.samples
+            || error < rms * (1.0 - 1e-6)
+        {
             return Err(format!("{line}, but ours {:?} {error:e}", grid.samples).into());
         }
         let count = (size[0] * size[1]) as f64;
@@ -138,7 +143,7 @@ fn beside_scipy() -> Result<(), Failed> {
     let root = |x: f64| (x / samples).sqrt() / component.measured.diagonal;
     let [ours, least] = [squares, least].map(root);
     println!("RMS {ours:.3e} of the diagonal, SciPy {least:.3e}");
-    // Shared corners and sides cost little, as both images have the same points there.
+    // Shared corners and sides cost little, as both parts have the same points there.
     match ours <= 1.1 * least {
         true => Ok(()),
         false => Err(format!("RMS {ours:e}, but SciPy {least:e}").into()),

@@ -89,7 +89,7 @@ pub enum Command {
     /// Make a mesh again from the geometry images of an atlas
     #[command(after_help = REBUILD_EXAMPLES, after_long_help = REBUILD_EXAMPLES)]
     Rebuild(Rebuild),
-    /// Fit spline surfaces to the images of rectangles
+    /// Fit spline surfaces to the images of a grid
     #[command(after_help = FIT_EXAMPLES, after_long_help = FIT_EXAMPLES)]
     Fit(Fit),
     /// Lay a repeating image over the whole surface as one texture
@@ -217,10 +217,11 @@ Examples:
   affine-atlas fit affine-atlas-out/bunny
   affine-atlas fit affine-atlas-out/bunny -o bunny-splines --spacing 2 --against bunny.obj
 
-Fits one bicubic B-spline surface to the image of every rectangle. Neighbours share the control
-points of their sides, so that there are no gaps. The new folder holds
+Fits bicubic B-spline surfaces to the images of a grid: one to every block, or to each of its parts where it
+is divided so that whole sides meet. Neighbours share the control points of their sides, so that there are no
+gaps. The new folder holds
   NAME.xml   a MultiPatch with interfaces and boundary, as G+Smo reads it (one a component)
-  fit.json   errors of every patch and of every shared side
+  fit.json   block, cells and errors of every surface, errors of every shared side
 It appears when it is complete.";
 
 const TEXTURE_EXAMPLES: &str = "\
@@ -388,7 +389,7 @@ pub struct Rebuild {
 
 #[derive(Debug, Args)]
 pub struct Fit {
-    /// Folder that `build` wrote for a mesh with images.domain = "rectangle"
+    /// Folder that `build` wrote for a mesh with images.domain = "grid"
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
     /// Folder to write, replacing an older one [default: DIR.fit]

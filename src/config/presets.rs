@@ -40,7 +40,7 @@ impl Preset {
     #[must_use]
     pub fn settings(self) -> &'static str {
         match self {
-            // Four times the default: a knot interval takes four sample steps, so that the splines' error is about half.
+            // A knot interval takes four sample steps: four of them a side of a cell.
             Self::SplineFit => "[images]\ndomain = \"grid\"\n[grid]\nsamples_per_cell = 16\n",
             // More cones vary less in scale, and one texel of padding is what bilinear interpolation needs: at so few texels each counts.
             Self::GeometryImage256 => {

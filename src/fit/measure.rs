@@ -146,7 +146,7 @@ pub fn measure(
         .par_iter()
         .zip(&surfaces.patches)
         .map(|(grid, surface)| {
-            let [columns, rows] = grid.lattice.samples;
+            let [columns, rows] = grid.samples;
             let (us, vs) = (
                 row_of(surface.basis[0], columns),
                 row_of(surface.basis[1], rows),
@@ -218,7 +218,7 @@ pub fn measure(
 
 /// The middles of all cells, rows of them one after the other.
 fn middles(grid: &Grid, surface: &BSplineSurface) -> Vec<Middle> {
-    let [columns, rows] = grid.lattice.samples;
+    let [columns, rows] = grid.samples;
     let middle = |i: usize, n: usize| (i as f64 + 0.5) / (n - 1) as f64;
     let part = 1.0 / ((columns - 1) * (rows - 1)) as f64;
     let cells = (0..rows - 1).flat_map(|k| (0..columns - 1).map(move |i| (i, k)));
@@ -246,7 +246,7 @@ fn row_of(basis: super::Basis, samples: usize) -> Vec<Local> {
 /// Both sides of an interface at the same points, which leave out the corners, where patches may have no normal.
 fn across(grids: &Grids, surfaces: &Surfaces, interface: &Interface) -> Along {
     let (first, second) = (interface.first, interface.second);
-    let samples = grids.patches[first.patch].lattice.samples[first.side.along()];
+    let samples = grids.patches[first.patch].samples[first.side.along()];
     let count = STEPS * (samples - 1);
     let mut along = Along::default();
     for i in 0..count {

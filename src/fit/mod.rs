@@ -1,30 +1,32 @@
-//! Bicubic B-spline surfaces through the geometry images of rectangles.
+//! Bicubic B-spline surfaces through the geometry images of a grid.
 //!
-//! *Enters:* [`Grids`]: the samples of rectangles, full grids from corner to corner, and the seams between them. *Leaves:* [`Surfaces`]: one
-//! tensor-product surface a rectangle over uniform open knots, and which sides meet; `measure` says how far they are off.
+//! *Enters:* [`Grids`]: samples of parts of blocks, full grids from corner to corner, and which of their sides are one curve. *Leaves:* [`Surfaces`]: one
+//! tensor-product surface a part over uniform open knots, and how they lie side by side; `measure` says how far they are off.
 //!
 //! ```text
-//! seams → sides that meet → corner points → one curve a shared side → the inside of every patch
+//! blocks → parts without T-junctions → one point a corner → one curve a shared side → the inside of every part
 //! ```
 //!
-//! A corner is the mean of the samples that stand for it (equal up to rounding). A curve between two corners is fitted once, to the mean of the
-//! samples on both sides of it, and both patches get its control points. Then the inner control points of a patch are fitted with
+//! Blocks of a grid have T-junctions, but tensor-product surfaces that share control points along their sides have none: [`divide`] goes on with lines
+//! until whole sides meet. A curve between two corners is fitted once, and both surfaces get its control points. Then the inner control points of a surface are fitted with
 //! its border fixed: what the border leaves of the samples is fitted by rows and then by columns, which is the least squares
 //! solution of the whole grid, since the equations are a Kronecker product.
 //!
-//! *Guaranteed:* patches meet without gaps: both have the same control points along a shared side, to the last bit, and the same knots; the same
-//! result for any number of threads. *Not guaranteed:* tangents that agree across sides (the surfaces are C² inside and C⁰ between), and a normal
-//! everywhere: at a corner where the angle of a patch is 0 or π there is none, and where samples crowd beside a bent side, knot intervals may be too long for it and the surface
-//! folds (`measure` says how much of it does).
+//! *Guaranteed:* surfaces meet without gaps: both have the same control points along a shared side, to the last bit, and the same knots; the same
+//! result for any number of threads. *Not guaranteed:* tangents that agree across sides (the surfaces are C² inside and C⁰ between), and surfaces that are nowhere turned over:
+//! `measure` says how much of them is.
 //!
 //! C. de Boor, *A Practical Guide to Splines* (1978), chapter XVII for tensor products; L. Piegl, W. Tiller, *The NURBS Book*
 //! (1997), 9.4.
 
 mod basis;
+mod blocks;
+mod division;
 mod error;
 mod least_squares;
 mod measure;
 mod neighbours;
+mod side;
 mod stored;
 mod surface;
 
@@ -32,15 +34,16 @@ mod surface;
 mod tests;
 
 pub use basis::{Basis, DEGREE};
+pub use blocks::{Block, Blocks};
+pub use division::{Division, Part, divide};
 pub use error::FitError;
 pub use least_squares::{LeastSquares, parameter};
 pub use measure::{Errors, Measured, PatchErrors, SeamErrors, measure};
-pub use neighbours::{Interface, Lattice, Neighbours, PatchSide, neighbours};
+pub use neighbours::Neighbours;
+pub use side::{Interface, PatchSide, Side};
 pub use stored::grids;
-pub use surface::{BSplineSurface, Jet, Side};
+pub use surface::{BSplineSurface, Jet};
 
-use crate::atlas::patches::Seam;
-use crate::geometry::mesh::{bounding_box, distance};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -48,25 +51,24 @@ use std::collections::BTreeMap;
 pub const DEFAULT_SPACING: f64 = 4.0;
 /// With fewer samples a knot interval control points follow the noise of single samples.
 pub const LEAST_SPACING: f64 = 2.0;
-/// Part of the diagonal by which samples of one corner may differ: float32 keeps 1e-7 of a coordinate, which is at most ten diagonals.
-const CORNER_TOLERANCE: f64 = 1e-5;
-
-/// Samples of one rectangle.
+/// Samples of a part of a block.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
-    /// Its size in samples and in patch coordinates.
-    pub lattice: Lattice,
+    /// Which.
+    pub part: Part,
+    /// Columns and rows.
+    pub samples: [usize; 2],
     /// Points in space, u fastest, from the lower left corner on.
     pub points: Vec<[f64; 3]>,
 }
 
 /// Everything that surfaces are fitted to.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Grids {
-    /// One a patch.
+    /// One a surface.
     pub patches: Vec<Grid>,
-    /// Where they meet.
-    pub seams: Vec<Seam>,
+    /// Which of their sides are one curve: there they have the same samples. Where they have not, those of the first count.
+    pub interfaces: Vec<Interface>,
 }
 
 /// Fitted surfaces.
@@ -83,7 +85,7 @@ pub struct Surfaces {
 /// Fits surfaces whose knot intervals take about `spacing` sample steps.
 ///
 /// # Errors
-/// Too few samples, seams that do not bound rectangles, and corners that are far apart.
+/// Too few samples, and interfaces that do not fit the grids.
 pub fn fit(grids: &Grids, spacing: f64) -> Result<Surfaces, FitError> {
     // Not a number is refused, too.
     if !(spacing >= LEAST_SPACING && spacing.is_finite()) {
@@ -96,9 +98,9 @@ pub fn fit(grids: &Grids, spacing: f64) -> Result<Surfaces, FitError> {
         return Err(FitError::NoPatches);
     }
     let fitters = fitters(&grids.patches, spacing)?;
-    let lattices: Vec<Lattice> = grids.patches.iter().map(|grid| grid.lattice).collect();
-    let neighbours = neighbours(&lattices, &grids.seams)?;
-    let corners = corner_points(&grids.patches, &neighbours)?;
+    let samples: Vec<[usize; 2]> = grids.patches.iter().map(|grid| grid.samples).collect();
+    let neighbours = Neighbours::new(&samples, grids.interfaces.clone())?;
+    let corners = corner_points(&grids.patches, &neighbours);
     let curves = curves(&grids.patches, &neighbours, &corners, &fitters);
     let patches: Vec<BSplineSurface> = grids
         .patches
@@ -128,13 +130,13 @@ type Fitters = BTreeMap<usize, LeastSquares>;
 fn fitters(grids: &[Grid], spacing: f64) -> Result<Fitters, FitError> {
     let mut fitters = Fitters::new();
     for (patch, grid) in grids.iter().enumerate() {
-        let [columns, rows] = grid.lattice.samples;
+        let [columns, rows] = grid.samples;
         for samples in [columns, rows] {
             if fitters.contains_key(&samples) {
                 continue;
             }
             let basis = Basis::for_samples(samples, spacing).ok_or(FitError::TooFewSamples {
-                patch,
+                block: grid.part.block,
                 columns,
                 rows,
             })?;
@@ -158,46 +160,20 @@ fn fitters(grids: &[Grid], spacing: f64) -> Result<Fitters, FitError> {
 
 /// Where the corners of a grid stand.
 fn corner_of(grid: &Grid, corner: usize) -> [f64; 3] {
-    let [columns, rows] = grid.lattice.samples;
+    let [columns, rows] = grid.samples;
     let (right, top) = (columns - 1, (rows - 1) * columns);
     grid.points[[0, right, top + right, top][corner]]
 }
 
-/// One point a corner: the mean of the samples there.
-fn corner_points(grids: &[Grid], neighbours: &Neighbours) -> Result<Vec<[f64; 3]>, FitError> {
-    let mut sum = vec![([0.0; 3], 0.0); neighbours.corners];
+/// One point a corner: the first sample there.
+fn corner_points(grids: &[Grid], neighbours: &Neighbours) -> Vec<[f64; 3]> {
+    let mut points = vec![None; neighbours.corners];
     for (grid, numbers) in grids.iter().zip(&neighbours.corner) {
         for (corner, &number) in numbers.iter().enumerate() {
-            let point = corner_of(grid, corner);
-            let (total, count) = &mut sum[number];
-            *total = std::array::from_fn(|c| total[c] + point[c]);
-            *count += 1.0;
+            points[number].get_or_insert_with(|| corner_of(grid, corner));
         }
     }
-    let points: Vec<[f64; 3]> = sum
-        .into_iter()
-        .map(|(total, count)| total.map(|x| x / count))
-        .collect();
-    let boxes: Vec<[f64; 3]> = grids
-        .iter()
-        .flat_map(|grid| <[[f64; 3]; 2]>::from(bounding_box(&grid.points)))
-        .collect();
-    let (low, high) = bounding_box(&boxes);
-    let diagonal = distance(low, high);
-    for (patch, (grid, numbers)) in grids.iter().zip(&neighbours.corner).enumerate() {
-        for (corner, &number) in numbers.iter().enumerate() {
-            let off = distance(corner_of(grid, corner), points[number]);
-            if off > CORNER_TOLERANCE * diagonal {
-                return Err(FitError::CornersApart {
-                    patch,
-                    corner,
-                    distance: off,
-                    relative: off / diagonal,
-                });
-            }
-        }
-    }
-    Ok(points)
+    points.into_iter().flatten().collect()
 }
 
 /// Control points of the four sides of every patch, each side in the direction of its parameter.
@@ -209,27 +185,18 @@ fn curves(
 ) -> Vec<[Vec<[f64; 3]>; 4]> {
     let samples = |s: PatchSide| -> Vec<[f64; 3]> {
         let grid = &grids[s.patch];
-        let places = s.side.grid(grid.lattice.samples);
+        let places = s.side.grid(grid.samples);
         places.into_iter().map(|i| grid.points[i]).collect()
     };
-    let curve = |s: PatchSide, samples: &[[f64; 3]]| {
+    let curve = |s: PatchSide| {
+        let samples = samples(s);
         let ends = s.side.corners().map(|k| neighbours.corner[s.patch][k]);
-        fitters[&samples.len()].fit(samples, ends.map(|number| corners[number]))
+        fitters[&samples.len()].fit(&samples, ends.map(|number| corners[number]))
     };
     let shared: Vec<Vec<[f64; 3]>> = neighbours
         .interfaces
         .par_iter()
-        .map(|interface| {
-            let mut points = samples(interface.first);
-            let mut others = samples(interface.second);
-            if interface.reversed {
-                others.reverse();
-            }
-            for (point, other) in points.iter_mut().zip(others) {
-                *point = std::array::from_fn(|c| 0.5 * (point[c] + other[c]));
-            }
-            curve(interface.first, &points)
-        })
+        .map(|interface| curve(interface.first))
         .collect();
     let mut sides = vec![[const { Vec::new() }; 4]; grids.len()];
     for (interface, control) in neighbours.interfaces.iter().zip(shared) {
@@ -242,14 +209,14 @@ fn curves(
         }
     }
     for &s in &neighbours.boundary {
-        sides[s.patch][s.side as usize] = curve(s, &samples(s));
+        sides[s.patch][s.side as usize] = curve(s);
     }
     sides
 }
 
 /// The surface of a patch whose border is known.
 fn inside(grid: &Grid, border: &[Vec<[f64; 3]>; 4], fitters: &Fitters) -> BSplineSurface {
-    let [columns, rows] = grid.lattice.samples;
+    let [columns, rows] = grid.samples;
     let (by_u, by_v) = (&fitters[&columns], &fitters[&rows]);
     let mut surface = BSplineSurface {
         basis: [by_u.basis(), by_v.basis()],

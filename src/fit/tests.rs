@@ -1,13 +1,13 @@
-//! Surfaces through samples of known ones, on few patches whose seams are written by hand.
+//! Surfaces through samples of known ones, on few patches whose interfaces are written by hand.
 
 mod basis;
+mod division;
 mod refusals;
 
 use super::*;
-use crate::atlas::patches::SeamSample;
 use crate::export::gismo;
 use crate::geometry::deviation::Triangles;
-use crate::geometry::ids::PatchId;
+use crate::geometry::mesh::distance;
 use std::f64::consts::FRAC_PI_2;
 
 /// Samples of a function of the unit square.
@@ -15,32 +15,25 @@ fn sampled(samples: [usize; 2], f: impl Fn(f64, f64) -> [f64; 3]) -> Grid {
     let [columns, rows] = samples;
     let points = (0..rows).flat_map(|k| (0..columns).map(move |i| (i, k)));
     Grid {
-        lattice: Lattice {
-            samples,
-            extent: [1.0, 0.7],
+        part: Part {
+            block: 0,
+            first: [0; 2],
+            cells: [1; 2],
         },
+        samples,
         points: points
             .map(|(i, k)| f(parameter(i, columns), parameter(k, rows)))
             .collect(),
     }
 }
 
-/// A seam along whole sides with a sample in the middle of each; the second runs against the first.
-fn seam(left: (usize, Side, bool), right: Option<(usize, Side, bool)>) -> Seam {
-    let place = |(_, side, forward): (usize, Side, bool), t: f64| {
-        let [u, v] = side.at(if forward { t } else { 1.0 - t });
-        [u, 0.7 * v]
-    };
-    Seam {
-        left: PatchId::new(left.0),
-        right: right.map(|side| PatchId::new(side.0)),
-        samples: [0.0, 0.4, 1.0]
-            .map(|t| SeamSample {
-                position: [0.0; 3],
-                left: place(left, t),
-                right: right.map_or([f64::NAN; 2], |right| place(right, t)),
-            })
-            .to_vec(),
+/// Two whole sides that are one curve; the flag says whether their parameters agree.
+fn interface(first: (usize, Side), second: (usize, Side), forward: bool) -> Interface {
+    let [first, second] = [first, second].map(|(patch, side)| PatchSide { patch, side });
+    Interface {
+        first,
+        second,
+        reversed: !forward,
     }
 }
 
@@ -48,10 +41,7 @@ fn seam(left: (usize, Side, bool), right: Option<(usize, Side, bool)>) -> Seam {
 fn alone(grid: Grid) -> Grids {
     Grids {
         patches: vec![grid],
-        seams: Side::ALL
-            .iter()
-            .map(|&side| seam((0, side, true), None))
-            .collect(),
+        interfaces: Vec::new(),
     }
 }
 
@@ -141,14 +131,6 @@ fn touching(k: Side, turns: usize) -> (Side, bool) {
     panic!("{k:?} {turns}");
 }
 
-fn open_sides(patches: usize, taken: &[(usize, Side)]) -> Vec<Seam> {
-    (0..patches)
-        .flat_map(|patch| Side::ALL.map(|side| (patch, side)))
-        .filter(|side| !taken.contains(side))
-        .map(|(patch, side)| seam((patch, side, true), None))
-        .collect()
-}
-
 /// Two pieces of one smooth surface in every position to each other.
 #[test]
 fn neighbours_share_their_sides_however_they_are_turned() {
@@ -164,11 +146,10 @@ fn neighbours_share_their_sides_however_they_are_turned() {
             } else {
                 [30, 21]
             };
-            let mut grids = Grids {
+            let grids = Grids {
                 patches: vec![sampled([21, 30], wavy), sampled(samples, second)],
-                seams: open_sides(2, &[(0, k), (1, m)]),
+                interfaces: vec![interface((1, m), (0, k), forward)],
             };
-            grids.seams.push(seam((0, k, true), Some((1, m, forward))));
             let fitted = fit(&grids, 4.0).expect("fits");
             let own = fitted.patches[0].side(k);
             let mut across = fitted.patches[1].side(m);
@@ -223,27 +204,7 @@ fn file_agrees_with_the_plane(fitted: &Surfaces, k: Side, turns: usize) {
     }
 }
 
-/// Both sides of a wall are sampled at different points: one curve all the same, between them.
-#[test]
-fn sides_with_different_samples_have_one_curve() {
-    let stretched = |u: f64, v: f64| wavy(1.0 + u, v + 0.05 * v * (1.0 - v));
-    let mut grids = Grids {
-        patches: vec![sampled([20, 24], wavy), sampled([16, 24], stretched)],
-        seams: open_sides(2, &[(0, Side::East), (1, Side::West)]),
-    };
-    grids
-        .seams
-        .push(seam((0, Side::East, true), Some((1, Side::West, true))));
-    let fitted = fit(&grids, 3.0).expect("fits");
-    assert_eq!(
-        fitted.patches[0].side(Side::East),
-        fitted.patches[1].side(Side::West)
-    );
-    let middle = fitted.patches[0].at([1.0, 0.5]).point;
-    assert!(distance(middle, wavy(1.0, 0.50625)) < 1e-3);
-}
-
-/// A torus that is one rectangle: all of its corners are one point.
+/// A torus that is one surface: all of its corners are one point.
 #[test]
 fn a_patch_may_meet_itself() {
     let turn = |t: f64| (4.0 * FRAC_PI_2 * t).sin_cos();
@@ -253,9 +214,9 @@ fn a_patch_may_meet_itself() {
     };
     let grids = Grids {
         patches: vec![sampled([40, 30], torus)],
-        seams: vec![
-            seam((0, Side::East, true), Some((0, Side::West, true))),
-            seam((0, Side::South, true), Some((0, Side::North, true))),
+        interfaces: vec![
+            interface((0, Side::East), (0, Side::West), true),
+            interface((0, Side::South), (0, Side::North), true),
         ],
     };
     let fitted = fit(&grids, 2.0).expect("fits");
@@ -265,47 +226,28 @@ fn a_patch_may_meet_itself() {
     assert_eq!(fitted.control_points, (columns - 1) * (rows - 1));
 }
 
-/// Two squares glued all around: the only seam is closed, passes four corners and begins inside a side.
+/// Two squares glued all around, one turned over: as many corners as a square has, and each side meets its mirror image.
 #[test]
-fn a_closed_seam_may_begin_anywhere() {
-    let around = [0.5, 1.0, 2.0, 2.5, 3.0, 4.0, 4.5f64];
-    let place = |x: f64| {
-        let (side, t) = ((x.floor() as usize) % 4, x.fract());
-        [[t, 0.0], [1.0, t], [1.0 - t, 1.0], [0.0, 1.0 - t]][side]
-    };
-    let samples = around.map(|x| {
-        let [u, v] = place(x);
-        SeamSample {
-            position: [0.0; 3],
-            left: [u, 0.7 * v],
-            right: [1.0 - u, 0.7 * v],
-        }
-    });
+fn a_closed_surface_of_two_has_four_corners() {
     let bulge = |sign: f64| move |u: f64, v: f64| [u, v, sign * u * v * (1.0 - u) * (1.0 - v)];
     let back = |u: f64, v: f64| bulge(-1.0)(1.0 - u, v);
     let grids = Grids {
         patches: vec![sampled([9, 12], bulge(1.0)), sampled([9, 12], back)],
-        seams: vec![Seam {
-            left: PatchId::new(0),
-            right: Some(PatchId::new(1)),
-            samples: samples.to_vec(),
-        }],
+        interfaces: vec![
+            interface((1, Side::North), (0, Side::North), false),
+            interface((0, Side::South), (1, Side::South), false),
+            interface((0, Side::East), (1, Side::West), true),
+            interface((1, Side::East), (0, Side::West), true),
+        ],
     };
     let fitted = fit(&grids, 2.0).expect("fits");
     let neighbours = &fitted.neighbours;
     assert_eq!((neighbours.corners, neighbours.interfaces.len()), (4, 4));
-    let met: Vec<(Side, Side, bool)> = neighbours
-        .interfaces
-        .iter()
-        .map(|i| (i.first.side, i.second.side, i.reversed))
-        .collect();
-    let expected = [
-        (Side::West, Side::East, false),
-        (Side::East, Side::West, false),
-        (Side::South, Side::South, true),
-        (Side::North, Side::North, true),
-    ];
-    assert_eq!(met, expected);
+    // Numbers run over the corners of the first in order; the other has them mirrored.
+    assert_eq!(neighbours.corner, [[0, 1, 2, 3], [1, 0, 3, 2]]);
+    let order: Vec<PatchSide> = neighbours.interfaces.iter().map(|i| i.first).collect();
+    assert!(order.is_sorted() && order.iter().all(|side| side.patch == 0));
+    assert!(neighbours.boundary.is_empty());
 }
 
 #[test]
@@ -317,12 +259,10 @@ fn distances_and_folds_are_measured() {
     };
     let floor = |u: f64, v: f64| [u, v, 0.25];
     let wall = |u: f64, v: f64| [1.0, v, 0.25 + u];
-    let mut grids = Grids {
+    let grids = Grids {
         patches: vec![sampled([12, 9], floor), sampled([8, 9], wall)],
-        seams: open_sides(2, &[(0, Side::East), (1, Side::West)]),
+        interfaces: vec![interface((0, Side::East), (1, Side::West), true)],
     };
-    let shared = seam((0, Side::East, true), Some((1, Side::West, true)));
-    grids.seams.push(shared);
     let fitted = fit(&grids, 3.0).expect("fits");
     let measured = measure(&grids, &fitted, mesh).expect("measured");
     let on_floor = measured.patches[0].surface;

@@ -1,6 +1,6 @@
-//! From a folder of rectangle images to spline surfaces: what `affine-atlas fit` does.
+//! From the images of a grid to spline surfaces: what `affine-atlas fit` does.
 //!
-//! Surfaces are fitted to the images, and joined by `atlas.json` and the seam samples; the surface of the atlas, or another mesh, is
+//! Surfaces are fitted to the images, and joined by what `atlas.json` says of their sides; the surface of the atlas, or another mesh, is
 //! only what they are measured against.
 
 use crate::export::ExportError;
@@ -174,7 +174,7 @@ impl FittedAsset {
         let components: Vec<_> = self.components.iter().map(FittedComponent::json).collect();
         serde_json::json!({
             "format": "affine-atlas-fit",
-            "version": 1,
+            "version": 2,
             "degree": fit::DEGREE,
             "spacing": self.spacing,
             "against": self.against,
@@ -191,7 +191,9 @@ impl FittedComponent {
         let patches = patches.map(|(id, ((surface, grid), error))| {
             serde_json::json!({
                 "id": id,
-                "samples": grid.lattice.samples,
+                "block": grid.part.block,
+                "cells": [grid.part.first, grid.part.cells],
+                "samples": grid.samples,
                 "control_points": surface.size(),
                 "sample_error": errors(&error.samples),
                 "surface_error": errors(&error.surface),
@@ -246,11 +248,14 @@ impl fmt::Display for FittedComponent {
         let neighbours = &self.surfaces.neighbours;
         let (patches, shared) = (self.surfaces.patches.len(), neighbours.interfaces.len());
         let boundary = neighbours.boundary.len();
+        let last = self.grids.patches.last();
+        let blocks = last.map_or(0, |grid| grid.part.block + 1);
         writeln!(
             f,
-            "{}: {patches} bicubic surface{}, {shared} shared side{}, {boundary} on the boundary, {} control points",
+            "{}: {patches} bicubic surface{} on {blocks} block{}, {shared} shared side{}, {boundary} on the boundary, {} control points",
             self.name,
             plural(patches),
+            plural(blocks),
             plural(shared),
             self.surfaces.control_points,
         )?;
@@ -296,6 +301,6 @@ impl fmt::Display for FittedComponent {
         let named: Vec<String> = named
             .map(|&i| format!("{i} ({:.1e})", part(max(i))))
             .collect();
-        writeln!(f, "  farthest from the surface: patch {}", named.join(", "))
+        writeln!(f, "  farthest off: surface {}", named.join(", "))
     }
 }

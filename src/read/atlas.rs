@@ -145,10 +145,40 @@ pub struct StoredImage {
     pub texel_to_patch: [[f64; 3]; 2],
     /// True where texels are grid corners of a block, false where they are texel centres of a `flat` patch.
     pub is_rectangle: bool,
+    /// Where the patch is a block of a grid.
+    pub block: Option<StoredBlock>,
     /// Surface points minus the image origin, row by row from the top.
     pub position: Vec<[f32; 3]>,
     /// 1 where the texel lies in the patch.
     pub alpha: Vec<f32>,
+}
+
+/// What is stated of a patch that is a block of a grid; not checked.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StoredBlock {
+    /// Columns and rows of cells.
+    pub cells: [usize; 2],
+    /// Texels on a side of a cell.
+    pub samples_per_cell: usize,
+    /// Pieces of the bottom, the right, the top and the left side.
+    pub sides: Vec<Vec<StoredPiece>>,
+}
+
+/// A stretch of a block's side, counterclockwise, in cells; not checked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+pub struct StoredPiece {
+    /// First cell.
+    pub start: usize,
+    /// Cells.
+    pub length: usize,
+    /// Patch across; none at a border of the surface.
+    pub patch: Option<usize>,
+    /// Its side.
+    pub side: Option<usize>,
+    /// Its first cell.
+    pub other_start: Option<usize>,
+    /// Whether the cells across run the other way.
+    pub reversed: bool,
 }
 
 /// The surface that an atlas is defined on.
@@ -206,6 +236,21 @@ struct Patch {
     width: usize,
     height: usize,
     texel_to_patch: [[f64; 3]; 2],
+    cells: Option<[usize; 2]>,
+    samples_per_cell: Option<usize>,
+    sides: Option<Vec<Vec<StoredPiece>>>,
+}
+
+impl Patch {
+    /// What is stated of a block, where all of it is.
+    fn block(&self) -> Option<StoredBlock> {
+        (self.domain == DOMAINS[2]).then_some(())?;
+        Some(StoredBlock {
+            cells: self.cells?,
+            samples_per_cell: self.samples_per_cell?,
+            sides: self.sides.clone()?,
+        })
+    }
 }
 
 /// The folders of the components of an asset, in order: the asset's own where it has one component.
@@ -379,6 +424,7 @@ fn image(folder: &Path, patch: &Patch) -> Result<StoredImage, FolderError> {
                 height: patch.height,
                 texel_to_patch: patch.texel_to_patch,
                 is_rectangle: patch.domain != DOMAINS[0],
+                block: patch.block(),
                 position: r
                     .into_iter()
                     .zip(g)

@@ -12,7 +12,11 @@ use std::process::Output;
 /// Part of the diagonal by which neighbours may be apart.
 const GAP: f64 = 1e-9;
 
-const RECTANGLE: [&str; 2] = ["images.domain=rectangle", "patches.texel_budget=65536"];
+const GRID: [&str; 3] = [
+    "images.domain=grid",
+    "grid.cells=500",
+    "report.enabled=false",
+];
 
 fn fit(folder: &Path, into: &Path, more: &[&str]) -> Output {
     let mut command = program();
@@ -20,8 +24,8 @@ fn fit(folder: &Path, into: &Path, more: &[&str]) -> Output {
     command.args(more).output().expect("the program starts")
 }
 
-fn rectangles(fixture: &str) -> Built {
-    build(&Path::new("fixtures/good").join(fixture), &RECTANGLE)
+fn grid(fixture: &str) -> Built {
+    build(&Path::new("fixtures/good").join(fixture), &GRID)
 }
 
 /// A surface as a file has it.
@@ -232,8 +236,9 @@ fn assert_open_and_uniform(knots: &[f64]) {
     }
 }
 
-fn fixture(name: &str) {
-    let built = rectangles(name);
+/// How many blocks and how many surfaces there are.
+fn fixture(name: &str) -> [usize; 2] {
+    let built = grid(name);
     let atlas = built.atlas();
     let stem = atlas.file_name().expect("a name").to_str().expect("UTF-8");
     let out = built.folder.path().join("splines");
@@ -271,8 +276,21 @@ fn fixture(name: &str) {
 
     // Errors are those of the samples in the images, and corners are samples.
     let images = read_images(&atlas).expect("images");
-    for (id, (patch, image)) in multi.patches.iter().zip(&images.images).enumerate() {
-        let [columns, rows] = [image.width, image.height];
+    let described = document(&atlas);
+    let counts = |value: &serde_json::Value| -> [usize; 2] {
+        [0, 1].map(|i| value[i].as_u64().expect("a count") as usize)
+    };
+    let mut cells = vec![0; images.images.len()];
+    for (id, patch) in multi.patches.iter().enumerate() {
+        let of_part = &figures["patches"][id];
+        let block = of_part["block"].as_u64().expect("a block") as usize;
+        let [first, size] = [0, 1].map(|i| counts(&of_part["cells"][i]));
+        cells[block] += size[0] * size[1];
+        let k = described["patches"][block]["samples_per_cell"].as_u64();
+        let k = k.expect("a count") as usize;
+        let [columns, rows] = size.map(|n| n * k + 1);
+        assert_eq!(counts(&of_part["samples"]), [columns, rows]);
+        let image = &images.images[block];
         let functions = |direction: usize, n: usize| -> Vec<Vec<f64>> {
             (0..n)
                 .map(|i| patch.functions(direction, i as f64 / (n - 1) as f64))
@@ -280,26 +298,30 @@ fn fixture(name: &str) {
         };
         let (us, vs) = (functions(0, columns), functions(1, rows));
         let (mut squares, mut largest) = (0.0, 0.0f64);
-        for (at, sample) in image.position.iter().enumerate() {
-            let (i, k) = (at % columns, rows - 1 - at / columns);
+        for (i, j) in (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))) {
+            let sample = image.position[(first[1] * k + j) * image.width + first[0] * k + i];
             let sample = [0, 1, 2].map(|c| f64::from(sample[c]) + images.image_origin[c]);
-            let off = distance(patch.at(&us[i], &vs[k]), sample);
+            let off = distance(patch.at(&us[i], &vs[j]), sample);
             squares += off * off;
             largest = largest.max(off);
-            if (i == 0 || i == columns - 1) && (k == 0 || k == rows - 1) {
+            if (i == 0 || i == columns - 1) && (j == 0 || j == rows - 1) {
                 assert!(off < 1e-6 * diagonal, "corner of patch {id}: {off:e}");
             }
         }
         let rms = (squares / (columns * rows) as f64).sqrt();
-        let stated = &figures["patches"][id]["sample_error"];
+        let stated = &of_part["sample_error"];
         let near = |a: f64, b: &serde_json::Value| {
             (a - b.as_f64().expect("a number")).abs() < 1e-9 * diagonal
         };
         assert!(near(rms, &stated["rms"]) && near(largest, &stated["max"]));
     }
+    for (block, &covered) in cells.iter().enumerate() {
+        let [w, h] = counts(&described["patches"][block]["cells"]);
+        assert_eq!(covered, w * h, "block {block}");
+    }
     let rms = figures["surface_error"]["rms"].as_f64().expect("a number");
-    // The cube has creases where splines have none, and samples of both sides of a wall may be different points of it.
     assert!(rms < 0.02 * diagonal, "{name}: {:e}", rms / diagonal);
+    [cells.len(), multi.patches.len()]
 }
 
 #[test]
@@ -312,9 +334,11 @@ fn genus_1_mug() {
     fixture("genus-1-mug.off");
 }
 
+/// Its blocks have T-junctions.
 #[test]
 fn genus_3_pretzel() {
-    fixture("genus-3-pretzel.obj");
+    let [blocks, surfaces] = fixture("genus-3-pretzel.obj");
+    assert!(surfaces > blocks, "{surfaces} on {blocks}");
 }
 
 #[test]
@@ -330,7 +354,7 @@ fn three_boundaries_rabbit() {
 /// More control points are nearer, for the samples and for the mesh itself.
 #[test]
 fn finer_knots_are_nearer() {
-    let built = rectangles("genus-2-amphora.glb");
+    let built = grid("genus-2-amphora.glb");
     let atlas = built.atlas();
     let out = built.folder.path().join("splines");
     let against = "fixtures/good/genus-2-amphora.glb";
@@ -357,7 +381,7 @@ fn finer_knots_are_nearer() {
 /// The same bytes for any number of threads, and no surface but the images is needed to fit.
 #[test]
 fn threads_do_not_change_a_byte() {
-    let built = rectangles("genus-1-mug.off");
+    let built = grid("genus-1-mug.off");
     let atlas = built.atlas();
     let run = |threads: &str| {
         let out = built.folder.path().join(threads);
@@ -373,7 +397,7 @@ fn threads_do_not_change_a_byte() {
 /// Every component gets a file of its own, in a folder beside that of the atlas.
 #[test]
 fn components_stay_apart() {
-    let built = build(Path::new("fixtures/bad/one-bad-component.obj"), &RECTANGLE);
+    let built = build(Path::new("fixtures/bad/one-bad-component.obj"), &GRID);
     assert_eq!(built.code(), Some(1), "one of them is one-sided");
     let folder = built.folder.path().join("one-bad-component");
     let output = program().arg("fit").arg(&folder).output();
@@ -387,9 +411,60 @@ fn components_stay_apart() {
     }
 }
 
+/// Numbers that are not those of the grid are refused with a sentence, whatever they are.
+#[test]
+fn damaged_sides_are_refused() {
+    let built = grid("genus-0-cube.obj");
+    let atlas = built.atlas();
+    let whole = document(&atlas);
+    let refitted = |json: &serde_json::Value| {
+        std::fs::write(atlas.join("atlas.json"), json.to_string()).expect("written");
+        affine_atlas::job::fit::fit(&atlas, &FitParams::default()).map_err(|e| e.to_string())
+    };
+    refitted(&whole).expect("fits as it is");
+    let values = [0, 1, 2, 5, 1000, u64::MAX].map(|n| serde_json::json!(n));
+    let values = [
+        &values[..],
+        &[serde_json::json!(-1), serde_json::Value::Null],
+    ]
+    .concat();
+    let last = whole["patches"].as_array().expect("a list").len() - 1;
+    let mut changes = 0;
+    for (patch, side) in [(0, 0), (last, 3)] {
+        for key in ["start", "length", "patch", "side", "other_start"] {
+            for value in &values {
+                let mut json = whole.clone();
+                let stated = &mut json["patches"][patch]["sides"][side][0][key];
+                if stated == value {
+                    continue;
+                }
+                *stated = value.clone();
+                let said = refitted(&json).expect_err("refused");
+                let names = format!("patches[{patch}].sides[{side}]");
+                let is_number =
+                    value.is_u64() || value.is_null() && key != "start" && key != "length";
+                assert!(
+                    !is_number || said.contains(&names),
+                    "{key} = {value}: {said}"
+                );
+                changes += 1;
+            }
+        }
+    }
+    assert!(changes >= 70, "{changes}");
+    let mut json = whole.clone();
+    json["patches"][last]["cells"][1] = serde_json::json!(0);
+    let said = refitted(&json).expect_err("refused");
+    assert!(
+        said.contains(&format!("the image of patch {last} has")),
+        "{said}"
+    );
+}
+
 #[test]
 fn what_is_there_stays_where_the_fit_fails() {
-    let flat = build(Path::new("fixtures/good/genus-0-cube.obj"), &[]);
+    let settings = ["images.domain=flat"];
+    let flat = build(Path::new("fixtures/good/genus-0-cube.obj"), &settings);
     let atlas = flat.atlas();
     let out = flat.folder.path().join("splines");
     let said = |output: Output, code: i32| {
@@ -400,18 +475,18 @@ fn what_is_there_stays_where_the_fit_fails() {
     };
     insta::assert_snapshot!(
         said(fit(&atlas, &out, &[]), 1),
-        @r#"failed: FOLDER/genus-0-cube (input): genus-0-cube: patch 0 is "flat", an image with a mask; splines need full grids: build the atlas again with images.domain = "rectangle" (`affine-atlas build MESH --set images.domain=rectangle`)"#
+        @r#"failed: FOLDER/genus-0-cube (input): genus-0-cube: patch 0 is no block of a grid; splines need images without a mask whose sides have the same samples: build the atlas again with images.domain = "grid" (`affine-atlas build MESH --set images.domain=grid`)"#
     );
     assert!(!out.exists());
 
-    let built = rectangles("genus-0-cube.obj");
-    let rectangle = built.atlas();
+    let built = grid("genus-0-cube.obj");
+    let atlas_of_grid = built.atlas();
     // Neither an atlas nor what others wrote is replaced.
     std::fs::create_dir(&out).expect("created");
     std::fs::write(out.join("notes.txt"), "mine").expect("written");
     for target in [&atlas, &out] {
         let before = files(target);
-        let text = said(fit(&rectangle, target, &[]), 1);
+        let text = said(fit(&atlas_of_grid, target, &[]), 1);
         assert!(
             text.contains("holds nothing that this command wrote earlier"),
             "{text}"
@@ -420,14 +495,14 @@ fn what_is_there_stays_where_the_fit_fails() {
     }
     // An older fit is, whole, but not by one that fails.
     std::fs::remove_file(out.join("notes.txt")).expect("there");
-    let first = said(fit(&rectangle, &out, &["--spacing", "2"]), 0);
+    let first = said(fit(&atlas_of_grid, &out, &["--spacing", "2"]), 0);
     assert_eq!(first, "");
     let before = files(&out);
-    said(fit(&rectangle, &out, &[]), 0);
+    said(fit(&atlas_of_grid, &out, &[]), 0);
     let after = files(&out);
     assert!(before.keys().eq(after.keys()) && before != after);
-    let image = rectangle.join("images/0000.exr");
+    let image = atlas_of_grid.join("images/0000.exr");
     std::fs::write(&image, b"no image").expect("written");
-    said(fit(&rectangle, &out, &[]), 1);
+    said(fit(&atlas_of_grid, &out, &[]), 1);
     assert!(files(&out) == after);
 }

@@ -2,7 +2,6 @@
 
 use super::super::presets::WORDS;
 use super::*;
-use crate::atlas::patches::Domain;
 
 #[test]
 fn every_word_is_a_preset_and_every_preset_changes_something() {
