@@ -1,8 +1,8 @@
 //! How well geometry images hold a surface, at equal total texels: ours in all domains, beside the same sampler on the atlases of other programs.
 //!
-//! `cargo bench --bench images -- [--peers DIR] [--flat | --rect | --grid] MESH…`: 128², 256² and 512² texels in all images together, their margins included. DIR holds
+//! `cargo bench --bench images -- [--peers DIR] [--flat | --grid] MESH…`: 128², 256² and 512² texels in all images together, their margins included. DIR holds
 //! `NAME.TOOL.obj`, the mesh with the texture coordinates of a tool, as `benches/peers/atlases.py` writes them. PSNR is
-//! 20 log10(diagonal / symmetric RMS distance) of the mesh that is rebuilt from images and seam samples. `--flat`, `--rect` and `--grid` leave the other domains out. Flat images are those of
+//! 20 log10(diagonal / symmetric RMS distance) of the mesh that is rebuilt from images and seam samples. `--flat` and `--grid` leave the other domain out. Flat images are those of
 //! `preset = "geometry-image-256"`, but without padding, as are charts of other programs. Nothing here is timed.
 
 mod common;
@@ -37,13 +37,12 @@ const ROUNDS: usize = 8;
 fn main() -> Result<(), Box<dyn Error>> {
     let mut peers: Option<PathBuf> = None;
     let mut meshes: Vec<PathBuf> = Vec::new();
-    let mut domains = vec![Domain::Flat, Domain::Rectangle, Domain::Grid];
+    let mut domains = vec![Domain::Grid, Domain::Flat];
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--peers" => peers = Some(arguments.next().ok_or("--peers needs a folder")?.into()),
             "--flat" => domains = vec![Domain::Flat],
-            "--rect" => domains = vec![Domain::Rectangle],
             "--grid" => domains = vec![Domain::Grid],
             // What cargo adds.
             "--bench" => {}
@@ -58,7 +57,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         for &domain in &domains {
             let label = match domain {
                 Domain::Flat => "ours, flat",
-                Domain::Rectangle => "ours, rectangle",
                 Domain::Grid => "ours, grid",
             };
             row(&name, label, |side| ours(&asset.soup, domain, side));
@@ -95,14 +93,12 @@ fn row(name: &str, atlas: &str, of: impl Fn(usize) -> Result<Found, Box<dyn Erro
     println!("| {name} | {atlas} | {patches} | {} |", cells.join(" | "));
 }
 
-/// Flat images as the preset for them makes them, rectangles by default.
+/// Flat images as the preset for them makes them, grids by default.
 fn settings(domain: Domain) -> Result<Config, Box<dyn Error>> {
     let mut config = match domain {
         Domain::Flat => config::parse("settings", "preset = \"geometry-image-256\"", &[])?,
-        Domain::Rectangle => Config::default(),
-        Domain::Grid => config::parse("settings", "images.domain = \"grid\"", &[])?,
+        Domain::Grid => config::parse("settings", "", &[])?,
     };
-    config.images.domain = domain;
     // What is rebuilt needs no texels beside a patch.
     config.patches.padding = 0;
     Ok(config)
@@ -110,14 +106,20 @@ fn settings(domain: Domain) -> Result<Config, Box<dyn Error>> {
 
 fn ours(soup: &Soup, domain: Domain, side: usize) -> Result<Found, Box<dyn Error>> {
     let mut config = settings(domain)?;
-    config.patches.texel_budget = side * side;
-    config.patches.min_side = MIN_SIDE;
-    // About a thousand cells: as many as fit with their texels on both sides of borders.
-    config.grid.samples_per_cell = side / CELLS_ON_SIDE;
+    match domain {
+        Domain::Flat => {
+            config.patches.texel_budget = side * side;
+            config.patches.min_side = MIN_SIDE;
+        }
+        // About a thousand cells: as many as fit with their texels on both sides of borders.
+        Domain::Grid => config.grid.samples_per_cell = side / CELLS_ON_SIDE,
+    }
     let mut cells = (CELLS_ON_SIDE * CELLS_ON_SIDE) as f64;
     let mut atlas = None;
     for _ in 0..ROUNDS {
-        config.grid.cells = cells as usize;
+        if domain == Domain::Grid {
+            config.grid.cells = cells as usize;
+        }
         let built = job::build(soup, &config, &())?.swap_remove(0)?;
         let texels: usize = built.images.iter().map(|i| i.width * i.height).sum();
         let is_within = texels <= side * side || domain != Domain::Grid;

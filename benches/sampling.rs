@@ -26,11 +26,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     for path in &arguments.meshes {
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
         let asset = read::read(path, &Default::default())?;
-        for domain in [Domain::Flat, Domain::Rectangle] {
+        for domain in [Domain::Flat, Domain::Grid] {
             for side in SIDES {
                 let mut config = Config::default();
-                config.images.domain = domain;
-                config.patches.texel_budget = side * side;
+                config.images.domain = Some(domain);
+                match domain {
+                    Domain::Flat => config.patches.texel_budget = side * side,
+                    Domain::Grid => {
+                        config.grid.cells = side * side / config.grid.samples_per_cell.pow(2)
+                    }
+                }
                 let atlas = job::build(&asset.soup, &config, &())?.swap_remove(0)?;
                 let texels: usize = atlas.images.iter().map(|i| i.width * i.height).sum();
                 let alpha = atlas.images.iter().flat_map(|i| &i.alpha);

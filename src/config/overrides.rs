@@ -162,7 +162,7 @@ run.timeout = 7
         let config = config_of(TEXT, &[], "one.obj");
         assert_eq!(
             (config.images.domain, config.grid.cells),
-            (Domain::Grid, 500)
+            (Some(Domain::Grid), 500)
         );
         assert_eq!(config.run.timeout, Limit::At(7));
         let other = config_of(TEXT, &[], "other/one.obj");

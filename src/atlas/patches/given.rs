@@ -171,8 +171,8 @@ fn open_holes(mesh: &Mesh, is_cut: &mut EdgeVec<bool>) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples::{build, ramp};
     use super::super::layout;
+    use super::super::samples::{build, ramp};
     use super::*;
     use crate::atlas::geometry_image::{image_origin, sample};
     use crate::rebuild::{Images, rebuild};

@@ -476,6 +476,42 @@ fn padding_and_budget_are_kept() {
     }
 }
 
+/// The same sample in other units, with other last digits.
+fn perturbed(mut s: Sample, scale: f64) -> Sample {
+    let mut state = 99u64;
+    let mut wobble = |x: &mut f64| {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        *x *= scale * (1.0 + 1e-12 * ((state >> 33) as f64 / (1u64 << 31) as f64 - 0.5));
+    };
+    s.mesh
+        .positions
+        .as_mut_slice()
+        .iter_mut()
+        .flatten()
+        .for_each(&mut wobble);
+    s.length.as_mut_slice().iter_mut().for_each(&mut wobble);
+    let mut places: BTreeMap<u32, [f64; 2]> = BTreeMap::new();
+    for f in s.mesh.connectivity.faces() {
+        for (k, h) in s
+            .mesh
+            .connectivity
+            .face_halfedges(f)
+            .into_iter()
+            .enumerate()
+        {
+            let place = *places.entry(s.development.copy[h]).or_insert_with(|| {
+                let mut p = s.development.uv[f][k];
+                p.iter_mut().for_each(&mut wobble);
+                p
+            });
+            s.development.uv[f][k] = place;
+        }
+    }
+    s
+}
+
 #[test]
 fn units_and_last_digits_change_nothing() {
     let make: [fn() -> Sample; 4] = [
