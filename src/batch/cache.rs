@@ -461,7 +461,7 @@ mod tests {
             "configuration key cones.count changed from absent to 6"
         );
         let other = night.with_config(|config| {
-            config.cones.quantum = "1/2".parse().unwrap();
+            config.features.angle = 50.0;
             config.patches.padding = 7;
             config.run.threads = 3;
         });
@@ -471,7 +471,7 @@ mod tests {
         };
         let said = reason.to_string();
         assert!(
-            said.starts_with("configuration key cones.quantum changed from "),
+            said.starts_with("configuration key features.angle changed from "),
             "{said}"
         );
         assert!(said.ends_with(", and 1 other key"), "{said}");

@@ -174,7 +174,7 @@ mod tests {
     fn larger_files_and_images_need_more() {
         let config = Config::default();
         let mut fine = Config::default();
-        fine.patches.texel_budget *= 4;
+        fine.grid.cells *= 4;
         assert!(estimate(1 << 20, &config) > estimate(1 << 10, &config));
         assert!(estimate(1 << 20, &fine) > estimate(1 << 20, &config));
         assert_eq!(estimate(u64::MAX, &config), u64::MAX);
@@ -188,7 +188,7 @@ mod tests {
         let time = |bytes| expected_time(bytes, &config, true);
         assert!(time(1 << 20) > time(1 << 10));
         assert!(time(1 << 20) > expected_time(1 << 20, &other, true));
-        other.patches.texel_budget *= 16;
+        other.grid.cells *= 16;
         assert!(time(1 << 20) < expected_time(1 << 20, &other, true));
         assert!((1..100).contains(&expected_time(1 << 20, &config, false)));
         assert!(time(u64::MAX) > time(1 << 40));

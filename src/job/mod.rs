@@ -76,9 +76,10 @@ fn each(
 ) -> Result<(), BuildError> {
     observer.stage("repair", 0, 1);
     let repaired = repair::repair(soup, &config.repair)?;
+    let config = config.clone().resolved()?;
     let config = &Config {
         images: config.images.held_by(soup),
-        ..config.clone().resolved()?
+        ..config
     };
     let assigned = |c: &Config| cones::assign(&repaired, &c.cones, &c.boundary, &c.features);
     let requests = assigned(config)?;

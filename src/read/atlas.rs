@@ -244,7 +244,7 @@ struct Patch {
 impl Patch {
     /// What is stated of a block, where all of it is.
     fn block(&self) -> Option<StoredBlock> {
-        (self.domain == DOMAINS[2]).then_some(())?;
+        (self.domain == DOMAINS[1]).then_some(())?;
         Some(StoredBlock {
             cells: self.cells?,
             samples_per_cell: self.samples_per_cell?,

@@ -1,5 +1,6 @@
 //! Grids of a real model by the whole program: few and many cells, and an independent checker of the grid.
 
+use super::lines::array;
 use super::{checked_by, comparable};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -52,4 +53,40 @@ pub fn grids<K, E: ToString>(
         }
     }
     Ok(())
+}
+
+/// √(texels per area) over the surface, 95 % over 5 %, and the part of the square of texture coordinates that is covered.
+pub fn density(atlas: &Path, json: &Value) -> [f64; 2] {
+    let positions: Vec<f64> = array(atlas, "positions");
+    let faces: Vec<u32> = array(atlas, "faces");
+    let patch: Vec<u32> = array(atlas, "patch");
+    let uv: Vec<f64> = array(atlas, "patch_uv");
+    let scale = |p: u32| json["patches"][p as usize]["patch_to_packed"]["scale"].as_f64();
+    let (mut rows, mut filled) = (Vec::new(), 0.0);
+    for (f, corners) in faces.as_chunks::<3>().0.iter().enumerate() {
+        let at = |k: usize, i: usize| positions[3 * corners[k] as usize + i];
+        let side = |k: usize| -> [f64; 3] { std::array::from_fn(|i| at(k, i) - at(0, i)) };
+        let (a, b) = (side(1), side(2));
+        let normal = [0, 1, 2].map(|i| {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            a[j] * b[k] - a[k] * b[j]
+        });
+        let area = 0.5 * normal.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let plane = |k: usize| [0, 1].map(|i| uv[6 * f + 2 * k + i] - uv[6 * f + i]);
+        let (a, b) = (plane(1), plane(2));
+        let covered = 0.5 * (a[0] * b[1] - a[1] * b[0]) * scale(patch[f]).expect("a scale").powi(2);
+        filled += covered;
+        rows.push(((covered / area).sqrt(), area));
+    }
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let whole: f64 = rows.iter().map(|row| row.1).sum();
+    let quantile = |share: f64| {
+        let mut below = 0.0;
+        let found = rows.iter().find(|row| {
+            below += row.1;
+            below >= share * whole
+        });
+        found.map_or(f64::NAN, |row| row.0)
+    };
+    [quantile(0.95) / quantile(0.05), filled]
 }
