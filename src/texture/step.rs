@@ -4,9 +4,9 @@
 //!
 //! Points are looked up in the texture as a viewer would. A pair across an edge has one point half a texel on one side and the other one and a
 //! half on the other side, both ways: pairs at the same distance from an edge would find nothing where it is a mirror of the pattern, as
-//! borders of tiles often are. A pattern is not equally varied everywhere, and edges of patches are borders of tiles: so the
-//! same pairs are also looked up one whole tile farther into the patch, on either side, where the pattern is the same. Places whose neighbours one tile away
-//! lie in no patch of theirs are left out of both.
+//! borders of tiles often are. A pattern is not equally varied everywhere, and edges of patches are borders of tiles: so each
+//! pair is also looked up one whole tile farther into the patch of its second point, where the pattern is the same. Pairs that would lie outside of that
+//! patch are left out of both.
 
 use super::paint::Painted;
 use super::tiling::Tiling;
@@ -156,27 +156,20 @@ impl Viewer<'_> {
         let mut means = Means::default();
         for k in 0..count as usize {
             let t = (k as f64 + 0.5) / count;
-            let (mut across, mut beside, mut sides) = (0.0, 0.0, 0.0);
             for (side, other) in [(&left, &right), (&right, &left)] {
+                let moved = PAIR.map(|x| side.tile_away(side.place(t, x * texel), self.tile));
+                let [low, high] = self.ranges[side.patch as usize];
+                let is_inside = |p: &[f64; 2]| (0..2).all(|i| low[i] <= p[i] && p[i] <= high[i]);
+                if !moved.iter().all(is_inside) {
+                    continue;
+                }
                 let near = other.place(t, -PAIR[0] * texel);
                 let far = side.place(t, PAIR[1] * texel);
-                across += 0.5 * self.difference([(other.patch, near), (side.patch, far)]);
-                let moved =
-                    PAIR.map(|inwards| side.tile_away(side.place(t, inwards * texel), self.tile));
-                let [low, high] = self.ranges[side.patch as usize];
-                if moved
-                    .iter()
-                    .all(|p| (0..2).all(|i| (low[i]..=high[i]).contains(&p[i])))
-                {
-                    beside += self.difference(moved.map(|p| (side.patch, p)));
-                    sides += 1.0;
-                }
-            }
-            if sides > 0.0 {
+                let weight = left.length / count;
                 means.add(Means {
-                    across: left.length / count * across,
-                    beside: left.length / count * beside / sides,
-                    length: left.length / count,
+                    across: weight * self.difference([(other.patch, near), (side.patch, far)]),
+                    beside: weight * self.difference(moved.map(|p| (side.patch, p))),
+                    length: weight,
                 });
             }
         }
