@@ -98,7 +98,10 @@ pub fn write_component(
 
     if let Some(grid) = &atlas.grid {
         let name = inside("quads.obj");
-        staging.write(&name, quads::text(grid).as_bytes())?;
+        staging.write(
+            &name,
+            quads::text(atlas, grid, &provenance.appearance.materials).as_bytes(),
+        )?;
         files.push(name);
     }
 

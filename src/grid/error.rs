@@ -6,6 +6,18 @@ use crate::geometry::ids::{EdgeId, FaceId, VertexId};
 /// Why there is no grid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GridError {
+    /// The surface would have far more faces than the mesh.
+    #[error(
+        "with straight borders and cones of quarter turns, edges of the flat surface cross those of the mesh so often that {vertices} vertices become {refined}, more than {most}: divide the long thin faces of the mesh"
+    )]
+    TooFine {
+        /// Of the mesh.
+        vertices: usize,
+        /// Of the surface that the grid would lie on.
+        refined: usize,
+        /// Most that are accepted.
+        most: usize,
+    },
     /// The sides of an edge are not a quarter turn apart.
     #[error(
         "both sides of edge {edge} are {gap:e} apart after a quarter turn: a grid needs flow.holonomy = \"quarter-turns\""

@@ -82,6 +82,25 @@ pub struct Cell {
     pub at: [u32; 2],
 }
 
+/// Vertices of the surface that a grid lies on, at most, for each of the mesh and beside that.
+const MOST_FOR_VERTEX: usize = 16;
+const MOST_BESIDE: usize = 50_000;
+
+/// Refuses surfaces on which a grid would take out of proportion long.
+pub(crate) fn check_size(vertices: usize, refined: usize) -> Result<(), GridError> {
+    let most = vertices
+        .saturating_mul(MOST_FOR_VERTEX)
+        .saturating_add(MOST_BESIDE);
+    match refined > most {
+        true => Err(GridError::TooFine {
+            vertices,
+            refined,
+            most,
+        }),
+        false => Ok(()),
+    }
+}
+
 /// Puts a grid on a surface and its images on that; the surface gets finer faces.
 ///
 /// # Errors

@@ -13,6 +13,7 @@ use crate::flow::refine::{self, RefineError};
 use crate::flow::ricci::FlowError;
 use crate::geometry::ids::{FaceId, VertexId};
 use crate::geometry::mesh::Mesh;
+use crate::grid::GridError;
 use crate::outcome::{Failure, FailureKind};
 use crate::read::ReadError;
 use crate::repair::{ComponentError, RepairError};
@@ -54,6 +55,9 @@ pub enum BuildError {
     /// The charts could not be made.
     #[error(transparent)]
     Chart(#[from] ChartError),
+    /// The surface is too fine for a grid.
+    #[error(transparent)]
+    Grid(#[from] GridError),
     /// The patches could not be made.
     #[error(transparent)]
     Patch(#[from] PatchError),
@@ -129,9 +133,10 @@ impl BuildError {
             BuildError::Read(_) | BuildError::Repair(_) | BuildError::Component(_) => {
                 FailureKind::Input
             }
-            BuildError::Config(_) | BuildError::Cones(_) | BuildError::Refine(_) => {
-                FailureKind::Prescription
-            }
+            BuildError::Config(_)
+            | BuildError::Cones(_)
+            | BuildError::Refine(_)
+            | BuildError::Grid(_) => FailureKind::Prescription,
             BuildError::Flow(
                 FlowError::Infeasible(_)
                 | FlowError::BadTarget { .. }

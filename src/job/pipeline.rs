@@ -69,6 +69,9 @@ fn pipeline(
         cut,
         connectivity_repair,
     } = flatten(mesh, prescription, config, observer, enter)?;
+    if config.domain() == Domain::Grid {
+        grid::check_size(given.len(), mesh.positions.len())?;
+    }
     let c = &mesh.connectivity;
     enter("charts")?;
     let mut unfolded = develop::develop(&layout, layout_cut)?;

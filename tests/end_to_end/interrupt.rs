@@ -118,7 +118,7 @@ fn while_the_metric_is_computed() {
 
 #[test]
 fn while_images_are_sampled() {
-    interrupt_at("patches");
+    interrupt_at("images");
 }
 
 #[test]

@@ -267,8 +267,8 @@ fn files_that_are_missing_or_do_not_fit() {
     insta::assert_snapshot!(said, @"failed: CUBE (input): CUBE/images/0000.exr has 26 columns and 26 rows, but atlas.json states 7 and 26");
     let said = refusal(|atlas| edit_json(atlas, |d| d["patches"][0]["domain"] = "hexagon".into()));
     insta::assert_snapshot!(said, @r#"failed: CUBE (input): patch 0 of CUBE/atlas.json has the domain "hexagon"; it must be "flat" or "grid""#);
-    let said = refusal(|atlas| edit_json(atlas, |d| d["version"] = 2.into()));
-    insta::assert_snapshot!(said, @r#"failed: CUBE (input): CUBE/atlas.json says format "affine-atlas", version 2; this program reads "affine-atlas", version 1"#);
+    let said = refusal(|atlas| edit_json(atlas, |d| d["version"] = 3.into()));
+    insta::assert_snapshot!(said, @r#"failed: CUBE (input): CUBE/atlas.json says format "affine-atlas", version 3; this program reads "affine-atlas", versions 1 and 2"#);
     let said =
         refusal(|atlas| edit_json(atlas, |d| d["patches"][0]["image"] = "../0000.exr".into()));
     insta::assert_snapshot!(said, @r#"failed: CUBE (input): row 0 of the patches in CUBE/atlas.json has the id 0 and the image "../0000.exr"; ids count from 0 and images lie in the folder"#);

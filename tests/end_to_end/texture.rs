@@ -1,6 +1,6 @@
 //! Textures of whole builds: read back from their files and from the arrays they were made from.
 
-use crate::command::{Built, build_small, program};
+use crate::command::{Built, build, build_small, program};
 use crate::good::files;
 use affine_atlas::job::texture::{TextureParams, TexturedAsset, texture as lay};
 use affine_atlas::read::gridded::{GriddedSurface, read_gridded};
@@ -17,8 +17,8 @@ const WAVES: &str = "fixtures/patterns/waves.png";
 /// With a grid of so many cells.
 fn gridded(name: &str, cells: usize) -> Built {
     let cells = format!("grid.cells={cells}");
-    let settings = ["images.domain=\"grid\"", cells.as_str()];
-    build_small(&Path::new("fixtures/good").join(name), &settings)
+    let settings = [cells.as_str(), "report.enabled=false"];
+    build(&Path::new("fixtures/good").join(name), &settings)
 }
 
 fn run(folder: &Path, into: &Path, pattern: &Path, more: &[&str]) -> Output {

@@ -323,6 +323,9 @@ pub struct Patch {
     /// Of a block: what lies across its bottom, right, top and left.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub sides: Option<[Vec<SidePiece>; 4]>,
+    /// Of a block: the island of `TEXCOORD_0` that it lies in.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub island: Option<usize>,
     /// Patch coordinates to central-chart coordinates; null for a block of a grid.
     pub patch_to_chart: Option<Similarity>,
     /// Patch coordinates to the unit square of `surface.glb`, v up.

@@ -12,6 +12,8 @@ pub struct Grid {
     pub cells: usize,
     /// Number of blocks: patches.
     pub blocks: usize,
+    /// Number of islands that blocks form in `TEXCOORD_0`.
+    pub islands: usize,
     /// Texels on a side of a cell.
     pub samples_per_cell: usize,
     /// √(source area / cells), source units.
@@ -69,6 +71,7 @@ pub(super) fn grid(grid: &Built) -> Grid {
     Grid {
         cells: grid.cells(),
         blocks: grid.blocks.blocks.len(),
+        islands: grid.islands.corner.len(),
         samples_per_cell: grid.samples_per_cell,
         cell_size: grid.cell_size,
         turned_over: over.count(),

@@ -259,6 +259,7 @@ fn patches(atlas: &AffineAtlas) -> Vec<Patch> {
             cells: atlas.grid.as_ref().map(|grid| grid.blocks.blocks[id].cells),
             samples_per_cell: atlas.grid.as_ref().map(|grid| grid.samples_per_cell),
             sides: atlas.grid.as_ref().map(|grid| grid::sides(grid, id)),
+            island: atlas.grid.as_ref().map(|grid| grid.islands.place[id].0),
             patch_to_chart: patch.to_chart.map(|map| Similarity {
                 scale: map.scale,
                 rotation: wrap_angle(map.rotation),

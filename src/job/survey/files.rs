@@ -196,7 +196,7 @@ fn configuration(
         "\n[input]\npaths = {paths}\n\n[output]\nfolder = \"..\""
     );
 
-    let mut own = config.clone();
+    let mut own = super::for_survey(config).map_err(|e| unwritable(e.to_string()))?;
     own.cones = super::with_cones(config, ConeStrategy::Listed, choice.count).cones;
     if list.is_empty() {
         own.cones.strategy = ConeStrategy::None;
