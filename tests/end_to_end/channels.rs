@@ -456,3 +456,73 @@ fn verify_misses_promised_channels() {
         );
     }
 }
+
+/// Weights of a point near a triangle; none where it lies outside or beside it.
+fn near(t: &[P3; 3], p: P3) -> Option<[f64; 3]> {
+    let (a, b, d) = (minus(t[1], t[0]), minus(t[2], t[0]), minus(p, t[0]));
+    let n = cross(a, b);
+    let square = dot(n, n);
+    let v = dot(cross(d, b), n) / square;
+    let w = dot(cross(a, d), n) / square;
+    let weights = [1.0 - v - w, v, w];
+    let is_near = dot(d, n).abs() / square.sqrt() < 1e-4;
+    (is_near && weights.iter().all(|x| *x > -1e-3)).then_some(weights)
+}
+
+/// Corners of quads have the texture coordinates of a face of the file that they lie in, and quads inside one material have it.
+#[test]
+fn the_quad_mesh_has_materials_and_texture_coordinates() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mesh = folder.path().join("bumpy.obj");
+    let source = bumpy(&mesh);
+    let built = build(&mesh, &["report.enabled=false"]);
+    let text = std::fs::read_to_string(built.atlas().join("quads.obj")).expect("quads.obj");
+    let (mut points, mut coordinates) = (Vec::new(), Vec::new());
+    let (mut material, mut names) = (String::new(), BTreeMap::new());
+    let (mut corners_seen, mut inside) = (0, 0);
+    for line in text.lines() {
+        let (kind, rest) = line.split_once(' ').expect("words");
+        let numbers = || rest.split(' ').map(|x| x.parse::<f64>().expect("a number"));
+        match kind {
+            "v" => points.push(<P3>::try_from(numbers().collect::<Vec<_>>()).expect("three")),
+            "vt" => coordinates.push(numbers().collect::<Vec<_>>()),
+            "usemtl" => material = rest.to_owned(),
+            _ => {
+                *names.entry(material.clone()).or_insert(0) += 1;
+                let mut materials: Vec<u32> = Vec::new();
+                for corner in rest.split(' ') {
+                    let (v, t) = corner.split_once('/').expect("texture coordinates");
+                    let [v, t] = [v, t].map(|x| x.parse::<usize>().expect("a row") - 1);
+                    let mut best = f64::INFINITY;
+                    for (f, t3) in source.position.iter().enumerate() {
+                        let Some(weights) = near(t3, points[v]) else {
+                            continue;
+                        };
+                        materials.push(source.material[f]);
+                        let of = |i: usize| -> f64 {
+                            (0..3).map(|k| weights[k] * source.texcoord[f][k][i]).sum()
+                        };
+                        let [u, v] = [0, 1].map(|i| of(i) - coordinates[t][i]);
+                        best = best.min(u.hypot(v));
+                    }
+                    assert!(best < 0.01, "{line}: {best}");
+                    corners_seen += 1;
+                }
+                let first = materials[0];
+                if materials.iter().all(|m| *m == first) {
+                    let name = match first {
+                        NONE => "none".to_owned(),
+                        m => format!("paint{}", m + 1),
+                    };
+                    assert_eq!(material, name, "{line}");
+                    inside += 1;
+                }
+            }
+        }
+    }
+    assert!(
+        corners_seen > 4000 && inside > 500,
+        "{corners_seen} {inside}"
+    );
+    assert_eq!(names.len(), 7, "{names:?}");
+}

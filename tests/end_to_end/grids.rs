@@ -191,3 +191,41 @@ fn a_tetrahedron_has_a_grid() {
     verify(&atlas);
     assert!(number(&document(&atlas)["grid"]["cells"]) >= 6);
 }
+
+/// A polygon of hundreds of corners in a fan of needles: straight borders would cut it into far more faces than it has.
+#[test]
+fn where_no_grid_can_be_made_there_are_flat_patches_and_the_reason() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mesh = folder.path().join("fan.obj");
+    let corners = 500;
+    let mut text = String::new();
+    for i in 0..corners {
+        let (y, x) = (std::f64::consts::TAU * f64::from(i) / f64::from(corners)).sin_cos();
+        text += &format!("v {x} {y} 0\n");
+    }
+    for i in 2..corners {
+        text += &format!("f 1 {i} {}\n", i + 1);
+    }
+    std::fs::write(&mesh, text).expect("written");
+    // Not quietly: it warns.
+    let mut command = crate::command::program();
+    command
+        .arg("build")
+        .arg(&mesh)
+        .arg("--out")
+        .arg(folder.path().join("out"));
+    for setting in ["report.enabled=false", "pictures.enabled=false"] {
+        command.args(["--set", setting]);
+    }
+    let output = command.output().expect("the program starts");
+    let atlas = folder.path().join("out/fan");
+    verify(&atlas);
+    let described = document(&atlas);
+    assert!(described["grid"].is_null());
+    assert_eq!(described["patches"][0]["domain"], "flat");
+    let reason = described["no_grid"].as_str().expect("a sentence");
+    assert!(reason.contains("500 vertices become"), "{reason}");
+    let said = String::from_utf8_lossy(&output.stderr);
+    let warned = format!("has flat patches instead of a grid: {reason}");
+    assert!(said.contains(&warned), "{said}");
+}
