@@ -274,7 +274,16 @@ fn unknown_preset() {
 #[test]
 fn rectangles() {
     let text = "[images]\ndomain = \"rectangle\"\n";
-    insta::assert_snapshot!(config_refusal(text), @"");
+    insta::assert_snapshot!(config_refusal(text), @r#"
+     error: `images.domain` is not "rectangle" any more: images.domain = "grid" samples rectangles of
+     | one grid on the whole surface, whose sides hold the same points
+      ,-[config.toml:2:10]
+    1 | [images]
+    2 | domain = "rectangle"
+      :          ^^^^^^^^^^^
+      `----
+     help: remove `images.domain`
+    "#);
 }
 
 #[test]
@@ -472,7 +481,7 @@ fn texture_without_a_folder_or_a_pattern() {
         include_bytes!("../fixtures/patterns/waves.png"),
     )
     .expect("written");
-    insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @r#"failed: atlas (input): atlas/atlas.json says format "", version 0; this program reads "affine-atlas", version 1"#);
+    insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @r#"failed: atlas (input): atlas/atlas.json says format "", version 0; this program reads "affine-atlas", versions 1 and 2"#);
     let head = r#"{"format": "affine-atlas", "version": 1, "patches": []}"#;
     std::fs::write(folder.path().join("atlas/atlas.json"), head).expect("written");
     insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @r#"failed: atlas (input): atlas/atlas.json has no grid: build with images.domain = "grid"; where that was set, no grid could be made, and the build's warning says why"#);

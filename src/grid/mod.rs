@@ -33,7 +33,7 @@ pub(crate) use refine::refined;
 
 use crate::atlas::charted::{self, Charted};
 use crate::atlas::geometry_image::GeometryImage;
-use crate::atlas::patches::{PatchLayout, PatchParams};
+use crate::atlas::patches::PatchLayout;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceVec, HalfedgeId, HalfedgeVec, VertexId};
 use crate::geometry::mesh::{Mesh, triangle_area};
@@ -84,7 +84,7 @@ pub struct Cell {
 
 /// Vertices of the surface that a grid lies on, at most, for each of the mesh and beside that.
 const MOST_FOR_VERTEX: usize = 16;
-const MOST_BESIDE: usize = 50_000;
+const MOST_BESIDE: usize = 20_000;
 
 /// Refuses surfaces on which a grid would take out of proportion long.
 pub(crate) fn check_size(vertices: usize, refined: usize) -> Result<(), GridError> {
@@ -105,26 +105,19 @@ pub(crate) fn check_size(vertices: usize, refined: usize) -> Result<(), GridErro
 ///
 /// # Errors
 /// Transitions that are no quarter turns, cones that no whole numbers fit, faces too thin for float64.
+///
+/// `gutter`: texels between islands.
 pub fn grid(
     surface: Charted,
     params: &GridParams,
-    patches: &PatchParams,
-) -> Result<(Charted, PatchLayout, Grid), Box<(Charted, GridError)>> {
+    gutter: usize,
+) -> Result<(Charted, PatchLayout, Grid), GridError> {
     let lines = lines(&surface, params.cells);
-    match made(
-        &surface.mesh,
-        &surface.central.uv,
-        &lines,
-        params,
-        patches.padding,
-    ) {
-        Ok((map, grid, located)) => {
-            let surface = charted::lift(surface, &map.sheet.fine);
-            let layout = patches::layout(&surface, &grid, located);
-            Ok((surface, layout, grid))
-        }
-        Err(error) => Err(Box::new((surface, error))),
-    }
+    let uv = &surface.central.uv;
+    let (map, grid, located) = made(&surface.mesh, uv, &lines, params, gutter)?;
+    let surface = charted::lift(surface, &map.sheet.fine);
+    let layout = patches::layout(&surface, &grid, located);
+    Ok((surface, layout, grid))
 }
 
 /// The same of a surface that lies on the plane face by face: source units, each face in a frame of its own.

@@ -25,10 +25,11 @@ pub use inspect::{Inspection, inspect};
 pub use precision::{Cause, Precision};
 
 use flatten::refine_for;
-use pipeline::build_component;
+use pipeline::pipeline;
 use publication::Publication;
 use warnings::warnings;
 
+use crate::atlas::patch::Domain;
 use crate::config::Config;
 use crate::export::folder::list_files;
 use crate::flow::cones;
@@ -65,6 +66,8 @@ struct Part<'a> {
     /// With its share of texels and pixels.
     config: &'a Config,
     atlas: Result<AffineAtlas, BuildError>,
+    /// Builds it of flat patches, for this reason.
+    without_grid: &'a dyn Fn(String) -> Result<AffineAtlas, BuildError>,
 }
 
 /// Builds one component after the other and hands each on before it begins the next, so that no more than one atlas need be in memory.
@@ -100,11 +103,26 @@ fn each(
             components,
         };
         let enter = |stage| stages.enter(stage);
+        let flat = config.on_flat_patches();
+        let spare = component.clone();
+        let without_grid = |reason: String| {
+            let spare = spare.clone();
+            pipeline(spare, &otherwise, &flat, Some(reason), observer, &enter)
+        };
+        let is_sound = component.mesh.is_ok();
+        let atlas = match pipeline(component, &requests, config, None, observer, &enter) {
+            Err(BuildError::Cancelled) => Err(BuildError::Cancelled),
+            Err(error) if is_sound && config.domain() == Domain::Grid => {
+                without_grid(error.to_string())
+            }
+            atlas => atlas,
+        };
         take(Part {
             index,
             components,
             config,
-            atlas: build_component(component, [requests, otherwise], config, observer, enter),
+            atlas,
+            without_grid: &without_grid,
         })?;
     }
     Ok(())
@@ -185,7 +203,18 @@ fn run_stages(
                 publication.leave_out(index, components);
                 Err(error)
             }
-            Ok(atlas) => {
+            Ok(mut atlas) => {
+                let mut added = publication.add(index, components, &atlas, part.config)?;
+                if let (Err(error), true) = (&added, atlas.grid.is_some()) {
+                    match (part.without_grid)(error.to_string()) {
+                        Err(BuildError::Cancelled) => return Err(BuildError::Cancelled),
+                        Err(error) => added = Err(error),
+                        Ok(flat) => {
+                            atlas = flat;
+                            added = publication.add(index, components, &atlas, part.config)?;
+                        }
+                    }
+                }
                 for note in warnings(&atlas, part.config) {
                     let note = match components {
                         1 => format!("{given} {note}"),
@@ -195,7 +224,6 @@ fn run_stages(
                     outcome.notes.push(note);
                 }
                 let folder = folder.join(Publication::subfolder(index, components));
-                let added = publication.add(index, components, &atlas, part.config)?;
                 added.map(|()| Summary::of(&atlas, folder))
             }
         };

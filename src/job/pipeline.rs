@@ -17,31 +17,8 @@ use crate::rebuild::Images;
 use crate::repair::Component;
 use crate::report;
 
-/// An atlas of a component: on a grid, where that is asked for and can be made, else of flat patches. `requests` are those of
-/// [`Config::on_flat_patches`] in the second place. `enter` is told each stage's name before it begins, and may stop the job.
-pub(super) fn build_component(
-    component: Component,
-    [requests, otherwise]: [Requests; 2],
-    config: &Config,
-    observer: &dyn Observer,
-    enter: impl Fn(&'static str) -> Result<(), BuildError>,
-) -> Result<AffineAtlas, BuildError> {
-    if config.domain() == Domain::Flat || component.mesh.is_err() {
-        return pipeline(component, &requests, config, None, observer, &enter);
-    }
-    let again = component.clone();
-    match pipeline(component, &requests, config, None, observer, &enter) {
-        Err(BuildError::Cancelled) => Err(BuildError::Cancelled),
-        Err(error) => {
-            let (config, reason) = (config.on_flat_patches(), error.to_string());
-            pipeline(again, &otherwise, &config, Some(reason), observer, &enter)
-        }
-        built => built,
-    }
-}
-
-/// The pipeline. `no_grid` says why there is none where one was wanted.
-fn pipeline(
+/// The pipeline. `enter` is told each stage's name before it begins, and may stop the job; `no_grid` says why there is none where one was wanted.
+pub(super) fn pipeline(
     component: Component,
     requests: &Requests,
     config: &Config,
@@ -93,34 +70,24 @@ fn pipeline(
         central,
         charts,
     };
-    let in_patches = |surface: &Charted| {
-        enter("patches")?;
-        let under = Some((&layout, &unfolded));
-        let layout = patches::layout(
-            &surface.mesh,
-            &surface.metric.length,
-            &surface.cut,
-            &surface.central,
-            under,
-            &config.patches,
-        );
-        layout.map_err(BuildError::from)
-    };
     let (surface, patches, grid, no_grid) = match config.domain() {
         Domain::Flat => {
-            let patches = in_patches(&surface)?;
+            enter("patches")?;
+            let patches = patches::layout(
+                &surface.mesh,
+                &surface.metric.length,
+                &surface.cut,
+                &surface.central,
+                Some((&layout, &unfolded)),
+                &config.patches,
+            )?;
             (surface, patches, None, no_grid)
         }
         Domain::Grid => {
             enter("grid")?;
-            match grid::grid(surface, &config.grid, &config.patches) {
-                Ok((surface, patches, grid)) => (surface, patches, Some(grid), None),
-                Err(refused) => {
-                    let (surface, error) = *refused;
-                    let patches = in_patches(&surface)?;
-                    (surface, patches, None, Some(error.to_string()))
-                }
-            }
+            let (surface, patches, grid) =
+                grid::grid(surface, &config.grid, config.patches.padding)?;
+            (surface, patches, Some(grid), None)
         }
     };
     let Charted {

@@ -146,7 +146,7 @@ fn a_name_that_is_no_unicode_works_or_is_refused_in_words() {
             1,
             "no Unicode text",
         ),
-        (&[os("fit"), inside], 1, "grid"),
+        (&[os("fit"), inside], 0, ""),
         (
             &[os("plan"), name, os("--out"), out, os("-p"), os("p.jsonl")],
             2,
