@@ -174,7 +174,7 @@ pub fn deviation(mesh: &Mesh, u: &[f64]) -> f64 {
 pub fn finished(triangles: &Triangles, cones: ConeParams) -> Result<AffineAtlas, String> {
     let config = Config {
         cones,
-        ..Config::default()
+        ..Config::default().on_flat_patches()
     };
     let mut built = build(&soup(triangles), &config, &()).map_err(|e| e.to_string())?;
     assert_eq!(built.len(), 1, "one component");
