@@ -85,7 +85,11 @@ fn seams_close(fixture: &str) -> Result<(), Failed> {
 
 /// Builds a mesh with few texels and no pictures.
 fn built(mesh: &Path, folder: &Path, keys: &[String]) -> Result<PathBuf, Failed> {
-    let small = ["patches.texel_budget=65536".to_owned()];
+    let on_grid = keys.iter().any(|key| key == "images.domain=grid");
+    let small = match on_grid {
+        true => ["grid.samples_per_cell=4".to_owned()],
+        false => ["patches.texel_budget=65536".to_owned()],
+    };
     let mut config = config::defaults(&[keys, &small].concat())?.config;
     config.pictures.enabled = false;
     let outcome = job::run(mesh, "model", folder, "asset", &config, &());

@@ -119,7 +119,7 @@ fn what_is_written_is_valid_and_what_is_broken_is_not() {
         with_cones,
         &[
             ("/format", Some(json!("another"))),
-            ("/version", Some(json!(2))),
+            ("/version", Some(json!(3))),
             ("/version", Some(json!("1"))),
             ("/topology", None),
             ("/topology/genus", None),

@@ -84,6 +84,9 @@ impl Mask {
     }
 }
 
+/// Where an island lies, in squares of the raster, and whether it is turned.
+type Placed = ([usize; 2], bool);
+
 /// Rows of bits, 64 a word.
 struct Rows {
     words: usize,
@@ -151,7 +154,7 @@ fn place(taken: &Rows, mask: &Mask, width: usize, below: usize) -> Option<[usize
 }
 
 /// Packs into a strip of the given width; the height comes last.
-fn strip(masks: &[[Mask; 2]], order: &[usize], width: usize) -> (Vec<([usize; 2], bool)>, usize) {
+fn strip(masks: &[[Mask; 2]], order: &[usize], width: usize) -> (Vec<Placed>, usize) {
     let mut places = vec![([0; 2], false); masks.len()];
     let mut taken = Rows {
         words: width.div_ceil(64) + 1,
@@ -226,7 +229,7 @@ pub(super) fn pack(outlines: &[Outline], samples: usize, gutter: usize) -> Packe
             .max();
         (reach.unwrap_or(1).max(height), places)
     };
-    let tried: Vec<(usize, Vec<([usize; 2], bool)>)> = jobs.par_iter().map(of).collect();
+    let tried: Vec<(usize, Vec<Placed>)> = jobs.par_iter().map(of).collect();
     let best = tried.into_iter().min_by_key(|(side, _)| *side);
     let (side, places) = best.unwrap_or_default();
     Packed {

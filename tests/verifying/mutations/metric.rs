@@ -13,7 +13,7 @@ pub fn mutations() -> Vec<Mutation> {
         mutation!(
             torus,
             "a later version",
-            |a| a.json["version"] = json!(2),
+            |a| a.json["version"] = json!(3),
             ["format"]
         ),
         mutation!(
