@@ -18,6 +18,16 @@ pub enum GridError {
         /// Most that are accepted.
         most: usize,
     },
+    /// Hardly a vertex lies inside: straight borders would cut the surface into far more faces than it has.
+    #[error(
+        "{border} vertices of the mesh lie on its border and only {inside} inside: a grid, whose borders are straight, needs vertices inside; remesh the surface"
+    )]
+    NothingInside {
+        /// Vertices on the border.
+        border: usize,
+        /// And inside.
+        inside: usize,
+    },
     /// The sides of an edge are not a quarter turn apart.
     #[error(
         "both sides of edge {edge} are {gap:e} apart after a quarter turn: a grid needs flow.holonomy = \"quarter-turns\""

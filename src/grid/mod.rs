@@ -86,6 +86,21 @@ pub struct Cell {
 const MOST_FOR_VERTEX: usize = 16;
 const MOST_BESIDE: usize = 20_000;
 
+/// With so many vertices on the border, at least one for each [`MOST_BORDER`] of them must be inside.
+const LONG_BORDER: usize = 1000;
+const MOST_BORDER: usize = 100;
+
+/// Refuses meshes without vertices inside, of which it is known before the flow that they would become too fine.
+pub(crate) fn check_inside(mesh: &Mesh) -> Result<(), GridError> {
+    let c = &mesh.connectivity;
+    let border = c.vertices().filter(|&v| c.is_boundary_vertex(v)).count();
+    let inside = c.vertex_count() - border;
+    match border >= LONG_BORDER && inside < border / MOST_BORDER {
+        true => Err(GridError::NothingInside { border, inside }),
+        false => Ok(()),
+    }
+}
+
 /// Refuses surfaces on which a grid would take out of proportion long.
 pub(crate) fn check_size(vertices: usize, refined: usize) -> Result<(), GridError> {
     let most = vertices

@@ -31,6 +31,9 @@ pub(super) fn pipeline(
     let mesh = component.mesh?;
     let (given, given_faces) = (mesh.positions.clone(), mesh.connectivity.to_faces());
     let source = SourceSurface::of(&mesh, &config.images);
+    if config.domain() == Domain::Grid {
+        grid::check_inside(&mesh)?;
+    }
     let mesh = match config.domain() {
         // Features that were named are edges of the mesh as it is.
         Domain::Grid if requests.features.is_empty() => grid::refined(mesh),
