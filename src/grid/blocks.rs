@@ -8,7 +8,8 @@
 
 use super::error::GridError;
 use super::quads::QuadMesh;
-use std::collections::BTreeMap;
+use std::cmp::Reverse;
+use std::collections::{BTreeSet, BinaryHeap};
 
 /// A rectangle of squares.
 #[derive(Clone, Debug, PartialEq)]
@@ -294,51 +295,71 @@ impl Walls<'_> {
         region
     }
 
-    /// Makes one of two blocks that share a whole side of both.
+    /// Makes one of two blocks that share a whole side of both: the longest sides first, then by block and side.
     fn join(&mut self, blocks: &mut Vec<Block>) -> Result<(), GridError> {
-        loop {
-            let sides = sides(self.mesh, blocks)?;
-            // By length, then by block and side.
-            let mut best: Option<(usize, usize, usize)> = None;
-            for (b, of_block) in sides.iter().enumerate() {
-                for (s, pieces) in of_block.iter().enumerate() {
-                    let [
-                        Piece {
-                            length,
-                            across: Some((other, t, _)),
-                            ..
-                        },
-                    ] = pieces[..]
-                    else {
-                        continue;
-                    };
-                    let is_whole = other != b && sides[other][t].len() == 1;
-                    if is_whole && best.is_none_or(|(most, ..)| length > most) {
-                        best = Some((length, b, s));
-                    }
+        let mut along = Along::new(self.mesh, blocks);
+        let mut left: Vec<Option<Block>> = blocks.drain(..).map(Some).collect();
+        let mut sides = Vec::with_capacity(left.len());
+        for block in left.iter().flatten() {
+            sides.push(along.pieces(self.mesh, block)?);
+        }
+        // Of two blocks beside each other, both whole sides; one that has changed since is found out when its turn comes.
+        let whole = |sides: &[[Vec<Piece>; 4]], b: usize, s: usize| match sides[b][s][..] {
+            [
+                Piece {
+                    length,
+                    across: Some((other, t, _)),
+                    ..
+                },
+            ] if other != b && sides[other][t].len() == 1 => Some((length, other)),
+            _ => None,
+        };
+        let mut heap: BinaryHeap<(usize, Reverse<usize>, Reverse<usize>)> = BinaryHeap::new();
+        let offer = |heap: &mut BinaryHeap<_>, sides: &[[Vec<Piece>; 4]], b: usize| {
+            for s in 0..4 {
+                if let Some((length, _)) = whole(sides, b, s) {
+                    heap.push((length, Reverse(b), Reverse(s)));
                 }
             }
-            let Some((_, b, s)) = best else {
-                return Ok(());
+        };
+        (0..left.len()).for_each(|b| offer(&mut heap, &sides, b));
+        while let Some((length, Reverse(b), Reverse(s))) = heap.pop() {
+            let (Some(block), Some((now, other))) = (&left[b], whole(&sides, b, s)) else {
+                continue;
             };
-            let Some((other, ..)) = sides[b][s][0].across else {
-                return Ok(());
+            let Some(beyond) = left[other].as_ref().filter(|_| now == length) else {
+                continue;
             };
-            for (q, k) in side_of(&blocks[b], s) {
+            for (q, k) in side_of(block, s) {
                 self.is_wall[q as usize][usize::from(k)] = false;
                 if let Some((q, k)) = self.mesh.across[q as usize][usize::from(k)] {
                     self.is_wall[q as usize][usize::from(k)] = false;
                 }
             }
-            let squares = [b, other].into_iter().flat_map(|b| &blocks[b].squares);
+            let squares = block.squares.iter().chain(&beyond.squares);
             let mut turned = squares.flat_map(|&(q, k)| (0..4u8).map(move |i| (q, (k + i) & 3)));
             let corner = turned.find(|&(q, k)| self.is(q, k) && self.is(q, k + 3));
             let joined = corner.and_then(|corner| self.rectangle(corner));
-            let square = blocks[b].squares[0].0;
+            let square = block.squares[0].0;
             let joined = joined.ok_or(GridError::NoRectangle { square })?;
-            blocks[b.min(other)] = joined;
-            blocks.remove(b.max(other));
+            let (kept, gone) = (b.min(other), b.max(other));
+            along.put(kept, &joined);
+            left[gone] = None;
+            sides[gone] = Default::default();
+            sides[kept] = along.pieces(self.mesh, &joined)?;
+            left[kept] = Some(joined);
+            let around = sides[kept].iter().flatten();
+            let around = around.filter_map(|piece| piece.across.map(|a| a.0));
+            let around: BTreeSet<usize> = around.chain([kept]).collect();
+            for &b in &around {
+                if let Some(block) = &left[b] {
+                    sides[b] = along.pieces(self.mesh, block)?;
+                }
+            }
+            around.iter().for_each(|&b| offer(&mut heap, &sides, b));
         }
+        blocks.extend(left.into_iter().flatten());
+        Ok(())
     }
 
     /// Divides blocks that lie beside themselves, as far as they have squares for that.
@@ -383,49 +404,62 @@ impl Walls<'_> {
 
 /// What lies across the sides of blocks.
 pub(super) fn sides(mesh: &QuadMesh, blocks: &[Block]) -> Result<Vec<[Vec<Piece>; 4]>, GridError> {
-    // Block, side and number along it of every side of a square on the border of its block.
-    let mut along: BTreeMap<(u32, u8), (usize, usize, usize)> = BTreeMap::new();
-    for (b, block) in blocks.iter().enumerate() {
+    let along = Along::new(mesh, blocks);
+    blocks.iter().map(|b| along.pieces(mesh, b)).collect()
+}
+
+/// Block, side and number along it of every side of a square on the border of its block.
+struct Along(Vec<[Option<(usize, usize, usize)>; 4]>);
+
+impl Along {
+    fn new(mesh: &QuadMesh, blocks: &[Block]) -> Self {
+        let mut along = Self(vec![[None; 4]; mesh.quads.len()]);
+        for (b, block) in blocks.iter().enumerate() {
+            along.put(b, block);
+        }
+        along
+    }
+
+    fn put(&mut self, b: usize, block: &Block) {
         for s in 0..4 {
-            for (i, side) in side_of(block, s).into_iter().enumerate() {
-                along.insert(side, (b, s, i));
+            for (i, (q, k)) in side_of(block, s).into_iter().enumerate() {
+                self.0[q as usize][usize::from(k)] = Some((b, s, i));
             }
         }
     }
-    let of = |block: &Block, s: usize| -> Result<Vec<Piece>, GridError> {
-        let mut pieces: Vec<Piece> = Vec::new();
-        for (i, (q, k)) in side_of(block, s).into_iter().enumerate() {
-            let across = match mesh.across[q as usize][usize::from(k)] {
-                Some(there) => {
-                    let square = there.0;
-                    let missing = GridError::NoRectangle { square };
-                    Some(*along.get(&there).ok_or(missing)?)
+
+    /// What lies across the sides of one block.
+    fn pieces(&self, mesh: &QuadMesh, block: &Block) -> Result<[Vec<Piece>; 4], GridError> {
+        let mut all: [Vec<Piece>; 4] = Default::default();
+        for (s, pieces) in all.iter_mut().enumerate() {
+            for (i, (q, k)) in side_of(block, s).into_iter().enumerate() {
+                let across = match mesh.across[q as usize][usize::from(k)] {
+                    Some((square, k)) => {
+                        let there = self.0[square as usize][usize::from(k)];
+                        Some(there.ok_or(GridError::NoRectangle { square })?)
+                    }
+                    None => None,
+                };
+                let goes_on = |piece: &Piece| match (piece.across, across) {
+                    (Some((b, s, last)), Some((c, t, at))) => (b, s) == (c, t) && at + 1 == last,
+                    (None, None) => true,
+                    _ => false,
+                };
+                match pieces.last_mut() {
+                    Some(piece) if goes_on(piece) => {
+                        piece.length += 1;
+                        piece.across = across;
+                    }
+                    _ => pieces.push(Piece {
+                        start: i,
+                        length: 1,
+                        across,
+                    }),
                 }
-                None => None,
-            };
-            let goes_on = |piece: &Piece| match (piece.across, across) {
-                (Some((b, s, last)), Some((c, t, at))) => (b, s) == (c, t) && at + 1 == last,
-                (None, None) => true,
-                _ => false,
-            };
-            match pieces.last_mut() {
-                Some(piece) if goes_on(piece) => {
-                    piece.length += 1;
-                    piece.across = across;
-                }
-                _ => pieces.push(Piece {
-                    start: i,
-                    length: 1,
-                    across,
-                }),
             }
         }
-        Ok(pieces)
-    };
-    let all = blocks
-        .iter()
-        .map(|block| Ok([of(block, 0)?, of(block, 1)?, of(block, 2)?, of(block, 3)?]));
-    all.collect()
+        Ok(all)
+    }
 }
 
 /// Squares along a side of a block, counterclockwise, with their sides there.

@@ -28,6 +28,16 @@ pub enum GridError {
         /// And inside.
         inside: usize,
     },
+    /// One place of the surface is too large on the plane beside another.
+    #[error(
+        "some places become e^{range:.0} times as large on the plane as others, more than e^{most}, which float64's 16 digits do not hold: more cones are needed (cones.count)"
+    )]
+    Range {
+        /// Of the log scale.
+        range: f64,
+        /// Most that is accepted.
+        most: f64,
+    },
     /// The sides of an edge are not a quarter turn apart.
     #[error(
         "both sides of edge {edge} are {gap:e} apart after a quarter turn: a grid needs flow.holonomy = \"quarter-turns\""
@@ -63,6 +73,18 @@ pub enum GridError {
         "no grid was found whose cells fit between the cones of the surface: ask for more cells, or for fewer cones (cones.count)"
     )]
     NoCells,
+    /// Cones far apart, measured in what lies between others, force far more cells than were wanted.
+    #[error(
+        "no fewer than about {cells} cells were found that fit between the cones of the surface, and {wanted:.0} were wanted: ask for at least {least:.0} (grid.cells), or for more cones (cones.count)"
+    )]
+    TooMany {
+        /// Cells of the coarsest grid that was found.
+        cells: i64,
+        /// What was asked for.
+        wanted: f64,
+        /// From how many on that would have been accepted.
+        least: f64,
+    },
     /// A number of cells that is no such number, or too many.
     #[error("{cells} cells were asked for: a grid has from 1 to {most}")]
     Cells {

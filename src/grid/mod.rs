@@ -101,6 +101,20 @@ pub(crate) fn check_inside(mesh: &Mesh) -> Result<(), GridError> {
     }
 }
 
+/// Range of the log scale on which a grid lies: 13 of float64's 16 digits.
+const MOST_RANGE: f64 = 30.0;
+
+/// Refuses metrics in which some places are too large beside others.
+pub(crate) fn check_range(log_scale: &[f64]) -> Result<(), GridError> {
+    let ends = |(low, high): (f64, f64), &x: &f64| (low.min(x), high.max(x));
+    let (low, high) = log_scale.iter().fold((0.0, 0.0), ends);
+    let (range, most) = (high - low, MOST_RANGE);
+    match range > most {
+        true => Err(GridError::Range { range, most }),
+        false => Ok(()),
+    }
+}
+
 /// Refuses surfaces on which a grid would take out of proportion long.
 pub(crate) fn check_size(vertices: usize, refined: usize) -> Result<(), GridError> {
     let most = vertices

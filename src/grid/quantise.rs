@@ -15,6 +15,9 @@ use std::collections::{BTreeMap, BinaryHeap};
 
 /// Most cells: a quad mesh of them takes some 5 GB.
 const MOST_CELLS: f64 = 1e7;
+/// Most cells for every one that is wanted or cone there is, and beside those.
+const MOST_FOR_CELL: f64 = 32.0;
+const MOST_BESIDE: f64 = 20_000.0;
 /// Most cells along a side, whose squares stay within 64 bits.
 const LONGEST: f64 = 1e9;
 /// Rounds of mending in which nothing is gained, before it is tried at a larger size.
@@ -28,6 +31,8 @@ const MOST_COST: f64 = 40.0;
 const MOST_ROUNDS: usize = 20;
 /// Rounds of walks and flips.
 const MOST_FLIP_ROUNDS: usize = 4;
+/// States that searches may visit in all to lower E, about four seconds; a hundred cones need a tenth of it.
+const MOST_VISITS: usize = 30_000_000;
 /// Least decrease of E that counts.
 const GAIN: f64 = 1e-9;
 /// Cost of a side without length.
@@ -81,7 +86,16 @@ pub fn quantise(complex: &Complex, vertices: usize, cells: f64) -> Result<Lattic
             break;
         }
     }
-    Ok(best)
+    let most = MOST_FOR_CELL * (cells + vertices as f64) + MOST_BESIDE;
+    let found = best.cells();
+    match found as f64 > most {
+        true => Err(GridError::TooMany {
+            cells: found,
+            wanted: cells,
+            least: (found as f64 - MOST_BESIDE) / MOST_FOR_CELL,
+        }),
+        false => Ok(best),
+    }
 }
 
 /// Steps where nothing is missing, at a size as wanted or so much larger that faces can be mended: rounding matters less and less.
@@ -324,6 +338,9 @@ impl Lattice {
             let mut has_gained = false;
             for &h in &sides {
                 for d in 0..4 {
+                    if walks.visits > MOST_VISITS {
+                        return;
+                    }
                     // Some side of a walk that lowers E lowers it by itself.
                     let steps = self.complex.side(h).steps;
                     let e = UNIT[usize::from(d)];

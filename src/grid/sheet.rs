@@ -15,6 +15,9 @@ const LEAST_PART: f64 = 1e-12;
 /// The end of a line that is a vertex already is met where its distance is right to this part.
 const GOAL: f64 = 1e-3;
 
+/// Steps of a line that bring it no nearer to its end, after which it is given up: it runs to and fro between points that float64 does not tell apart.
+const MOST_STALLS: usize = 16;
+
 /// See the module docs.
 pub(crate) struct Sheet {
     /// `corner[h].uv`: coordinates of the corner that h leaves, in the frame of its face.
@@ -227,10 +230,17 @@ impl Sheet {
                 .first()
                 .map_or(FaceId::new(0), |a| sheet.fine.connectivity.face(a.corner)),
         };
-        for _ in 0..4 * self.fine.connectivity.face_count() + 64 {
+        let (mut last, mut stalls) = (f64::INFINITY, 0);
+        loop {
             let (aim, way) = self.way(&aims, goal).ok_or_else(|| lost(&aims, self))?;
             let c = &self.fine.connectivity;
             let to = length(minus(aim.target, self.at(aim.corner)));
+            // A straight line comes nearer with every step.
+            stalls += usize::from(to >= last);
+            if stalls > MOST_STALLS {
+                return Err(lost(&aims, self));
+            }
+            last = to;
             let next = match way {
                 Way::Along(h) => {
                     let whole = length(self.vector(h));
@@ -302,7 +312,6 @@ impl Sheet {
             };
             aims = self.around(next);
         }
-        Err(lost(&aims, self))
     }
 
     /// Moves the vertex of a corner, around which nothing is curved, by what is given in the frame of its face.

@@ -49,6 +49,8 @@ pub struct Walks {
     /// The search in which a state was met.
     met: Vec<u32>,
     search: u32,
+    /// States visited by all searches.
+    pub(super) visits: usize,
     heap: BinaryHeap<Entry>,
 }
 
@@ -170,6 +172,7 @@ impl Lattice {
             from,
             met,
             search,
+            visits,
             heap,
         } = memory;
         let states = 4 * complex.places();
@@ -202,6 +205,7 @@ impl Lattice {
                 continue;
             }
             is_first = false;
+            *visits += 1;
             let (h, d) = state(at);
             for b in [complex.next(h), complex.prev(h)] {
                 let Some(step) = self.cost((h, d), b) else {

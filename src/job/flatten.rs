@@ -7,6 +7,7 @@
 use super::BuildError;
 use crate::atlas::cut::{self, CutGraph};
 use crate::atlas::overlay::{self, Layout, Overlay};
+use crate::atlas::patch::Domain;
 use crate::config::Config;
 use crate::flow::cones::{self, ConeError, Requests};
 use crate::flow::prescription::Prescription;
@@ -15,6 +16,7 @@ use crate::flow::refine::{self, RefineError};
 use crate::flow::ricci::{self, FlatMetric, FlowError, Holonomy};
 use crate::geometry::ids::EdgeVec;
 use crate::geometry::mesh::Mesh;
+use crate::grid;
 use crate::observe::Observer;
 
 /// A slit surface with a flat metric, before it is developed.
@@ -73,6 +75,9 @@ pub(super) fn flatten(
     enter("flow")?;
     let metric = ricci::flow(c, &source_length, &prescription, &config.flow, observer)
         .map_err(|e| BuildError::flow(e, &mesh))?;
+    if config.domain() == Domain::Grid {
+        grid::check_range(metric.log_scale.as_slice())?;
+    }
     let prescription = Prescription {
         // Of no use any more, and as large as the surface.
         field: None,

@@ -241,6 +241,15 @@ pub(super) fn angle_slack(l: [f64; 3]) -> f64 {
     4e-15 * longest(l) / shortest(l) + thin
 }
 
+/// Corner angles, opposite to the lengths, by the law of cosines.
+pub(super) fn angles_by_cosines(l: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|k| {
+        let [a, b, c] = [l[k], l[(k + 1) % 3], l[(k + 2) % 3]];
+        let cosine = (b * b + c * c - a * a) / (2.0 * b * c);
+        cosine.clamp(-1.0, 1.0).acos()
+    })
+}
+
 /// Axis-aligned bounds of a set of points, with its diagonal and its distance from the origin.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Extent2 {

@@ -23,7 +23,7 @@ pub(super) fn most_products(edges: usize) -> usize {
     (MOST_PRODUCTS_OF_EDGE * edges).max(ALLOWED_PRODUCTS)
 }
 
-/// A sparse matrix by columns; no row occurs twice in a column.
+/// A sparse matrix by columns; the rows of a column ascend.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Columns {
     /// Column c has the entries `first[c]..first[c + 1]`.
@@ -89,7 +89,28 @@ impl Columns {
         product
     }
 
+    /// Entries by rows: where those of a row begin, and column and place in it of each.
+    pub(super) fn by_row(&self, rows: usize) -> (Vec<u32>, Vec<(u32, u32)>) {
+        let mut first = vec![0u32; rows + 1];
+        for &r in &self.row {
+            first[r as usize + 1] += 1;
+        }
+        for r in 0..rows {
+            first[r + 1] += first[r];
+        }
+        let mut next = first.clone();
+        let mut entries = vec![(0, 0); self.row.len()];
+        for c in 0..self.count() {
+            for (at, &r) in self.column(c).0.iter().enumerate() {
+                entries[next[r as usize] as usize] = (c as u32, at as u32);
+                next[r as usize] += 1;
+            }
+        }
+        (first, entries)
+    }
+
     fn close(&mut self, collector: &mut Collector) {
+        collector.rows.sort_unstable();
         for &r in &collector.rows {
             self.row.push(r);
             self.value.push(collector.sum[r as usize]);

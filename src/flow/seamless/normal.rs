@@ -8,7 +8,7 @@ use super::jacobian::{Columns, most_products};
 use super::norm::Norm;
 use super::state::{Problem, State};
 use crate::flow::solve::SymmetricSolver;
-use crate::geometry::ids::{EdgeId, EdgeVec, VertexId};
+use crate::geometry::ids::{EdgeId, EdgeVec, NONE, VertexId};
 
 /// Shifts of the diagonal, relative to its mean, tried in turn until the matrix is positive definite.
 const SHIFTS: [f64; 4] = [1e-14, 1e-12, 1e-10, 1e-8];
@@ -22,16 +22,11 @@ pub(super) struct Normal {
     by_scales: Option<Columns>,
 }
 
-/// A M⁻¹ Aᵀ, off-diagonal entries in the order of the pairs.
+/// A M⁻¹ Aᵀ: every pair of equations that are coupled once, by the larger one.
 struct Products {
-    /// Equations of cones and features; loops are above.
-    local: usize,
-    loops: usize,
     pairs: Vec<[u32; 2]>,
     values: Vec<f64>,
     diagonal: Vec<f64>,
-    /// Loops with loops, lower triangle by rows.
-    among_loops: Vec<f64>,
 }
 
 impl Normal {
@@ -47,19 +42,16 @@ impl Normal {
         let by_scales = norm.vertex.as_ref();
         let by_scales = by_scales.map(|_| state.by_scales(problem, &by_edges));
         check_density(&by_edges, problem.base.edge_count())?;
-        let mut products = Products::new(problem.local_equations(), equations);
-        products.add(&by_edges, norm.edge.as_slice());
+        let mut parts = vec![(&by_edges, norm.edge.as_slice())];
         if let (Some(columns), Some(weight)) = (&by_scales, &norm.vertex) {
-            products.add(columns, weight.as_slice());
+            parts.push((columns, weight.as_slice()));
         }
-        products.list_loops();
         let Products {
-            loops,
             pairs,
             values,
             mut diagonal,
-            ..
-        } = products;
+        } = Products::new(equations, &parts);
+        let loops = equations - problem.local_equations();
         // An order that is kept although edges were flipped lets the factor fill up: twice over for one edge in a hundred.
         let mut solver = match last {
             Some(last) if last.pairs == pairs => last.solver,
@@ -130,47 +122,39 @@ fn check_density(by_edges: &Columns, edges: usize) -> Result<(), SeamlessError> 
 }
 
 impl Products {
-    fn new(local: usize, equations: usize) -> Self {
-        let loops = equations - local;
-        Self {
-            local,
-            loops,
-            pairs: Vec::new(),
-            values: Vec::new(),
-            diagonal: vec![0.0; equations],
-            among_loops: vec![0.0; loops * loops],
-        }
-    }
-
-    /// Adds Σ w a aᵀ over the columns a.
-    fn add(&mut self, columns: &Columns, weight: &[f64]) {
-        for (c, &w) in weight.iter().enumerate() {
-            let (rows, values) = columns.column(c);
-            for (i, (&r, v)) in rows.iter().zip(values).enumerate() {
-                let v = w * v;
-                self.diagonal[r as usize] += v * values[i];
-                for (&s, u) in rows[..i].iter().zip(values) {
-                    let (r, s) = (r.max(s) as usize, r.min(s) as usize);
-                    if s >= self.local {
-                        let at = (r - self.local) * self.loops + (s - self.local);
-                        self.among_loops[at] += v * u;
-                    } else {
-                        self.pairs.push([s as u32, r as u32]);
-                        self.values.push(v * u);
+    /// Σ w a aᵀ over the columns a of all parts, row by row (Gustavson 1978).
+    fn new(equations: usize, parts: &[(&Columns, &[f64])]) -> Self {
+        let by_row: Vec<_> = parts.iter().map(|part| part.0.by_row(equations)).collect();
+        let (mut pairs, mut values) = (Vec::new(), Vec::new());
+        let mut diagonal = vec![0.0; equations];
+        let mut sum = vec![0.0; equations];
+        let mut met = vec![NONE; equations];
+        let mut coupled: Vec<u32> = Vec::new();
+        for (r, diagonal) in diagonal.iter_mut().enumerate() {
+            for ((columns, weight), (first, entries)) in parts.iter().zip(&by_row) {
+                for &(c, at) in &entries[first[r] as usize..first[r + 1] as usize] {
+                    let (rows, values) = columns.column(c as usize);
+                    let v = weight[c as usize] * values[at as usize];
+                    *diagonal += v * values[at as usize];
+                    for (&s, u) in rows[..at as usize].iter().zip(values) {
+                        let place = s as usize;
+                        if met[place] != r as u32 {
+                            (met[place], sum[place]) = (r as u32, 0.0);
+                            coupled.push(s);
+                        }
+                        sum[place] += v * u;
                     }
                 }
             }
-        }
-    }
-
-    /// Lists the products of loops, every pair once.
-    fn list_loops(&mut self) {
-        for i in 0..self.loops {
-            for j in 0..i {
-                self.pairs
-                    .push([(self.local + j) as u32, (self.local + i) as u32]);
-                self.values.push(self.among_loops[i * self.loops + j]);
+            for s in coupled.drain(..) {
+                pairs.push([s, r as u32]);
+                values.push(sum[s as usize]);
             }
+        }
+        Self {
+            pairs,
+            values,
+            diagonal,
         }
     }
 }
