@@ -23,8 +23,12 @@ impl Config {
     /// The same with everything that the domain implies; see the module docs.
     ///
     /// # Errors
-    /// A domain and a setting that contradict each other.
+    /// Settings that contradict each other.
     pub fn resolved(self) -> Result<Self, ConfigError> {
+        if self.grid.cell_size.is_some() && self.grid.cells != GridParams::default().cells {
+            let (one, other) = ("grid.cells", "grid.cell_size");
+            return Err(ConfigError::Both { one, other });
+        }
         let (for_flat, for_grid) = (only_flat(&self), only_grid(&self));
         let contradicts = |key, domain| ConfigError::Domain { key, domain };
         match (self.images.domain, for_flat, for_grid) {
@@ -128,6 +132,8 @@ fn only_grid(config: &Config) -> Option<&'static str> {
     let default = GridParams::default();
     let keys = [
         ("grid.cells", config.grid.cells != default.cells),
+        ("grid.cell_size", config.grid.cell_size.is_some()),
+        ("grid.density", config.grid.density != default.density),
         (
             "grid.samples_per_cell",
             config.grid.samples_per_cell != default.samples_per_cell,
@@ -215,5 +221,8 @@ mod tests {
             assert!(error.to_string().contains(says), "{error}");
             assert!(error.remedy().contains("leave"), "{}", error.remedy());
         }
+        let error = parsed("grid.cells = 500\ngrid.cell_size = 0.1").expect_err("both");
+        let says = "`grid.cells` and `grid.cell_size` exclude each other";
+        assert!(error.to_string().contains(says), "{error}");
     }
 }

@@ -209,13 +209,13 @@ pub enum ConfigError {
         /// Why.
         reason: String,
     },
-    /// A list, and a file in its place.
-    #[error("`{list}` and `{file}` exclude each other")]
-    ListAndFile {
-        /// The key of the list.
-        list: &'static str,
-        /// The key of the file.
-        file: &'static str,
+    /// Two keys that say the same thing in different ways.
+    #[error("`{one}` and `{other}` exclude each other")]
+    Both {
+        /// The key of one.
+        one: &'static str,
+        /// The key of the other.
+        other: &'static str,
     },
     /// A setting that has a meaning without the domain only that was written.
     #[error(
@@ -274,7 +274,7 @@ impl ConfigError {
             | Self::Unreadable { .. }
             | Self::TooLong { .. }
             | Self::NoListFile { .. }
-            | Self::ListAndFile { .. }
+            | Self::Both { .. }
             | Self::Domain { .. }
             | Self::Domains { .. }
             | Self::OverrideWithoutValue { .. } => None,
@@ -323,7 +323,7 @@ impl ConfigError {
                 };
                 format!("each line holds {line}; `{key}_first_vertex` says where numbers begin")
             }
-            Self::ListAndFile { .. } => "remove one of them".to_owned(),
+            Self::Both { .. } => "remove one of them".to_owned(),
             Self::Domain { key, domain } => {
                 let other = match domain {
                     Domain::Grid => "flat",

@@ -538,6 +538,21 @@ pub const KEYS: &[Key] = &[
         "2000",
     ),
     key(
+        "grid.cell_size",
+        Kind::Number {
+            min: 1e-30,
+            max: 1e30,
+        },
+        "source units",
+        "absent",
+    ),
+    key(
+        "grid.density",
+        Kind::Choice(&["uniform", "curvature"]),
+        "",
+        "\"uniform\"",
+    ),
+    key(
         "grid.samples_per_cell",
         Kind::Integer { min: 1, max: 64 },
         "texels",

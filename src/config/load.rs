@@ -138,7 +138,10 @@ fn read_cones(config: &mut Config, base: &Path) -> Result<Option<PathBuf>, Confi
     };
     if !params.list.is_empty() {
         let (list, file) = ("cones.list", "cones.file");
-        return Err(ConfigError::ListAndFile { list, file });
+        return Err(ConfigError::Both {
+            one: list,
+            other: file,
+        });
     }
     let path = base.join(given);
     let first = params.file_first_vertex;
@@ -156,7 +159,10 @@ fn read_features(config: &mut Config, base: &Path) -> Result<Option<PathBuf>, Co
     };
     if !params.list.is_empty() {
         let (list, file) = ("features.list", "features.file");
-        return Err(ConfigError::ListAndFile { list, file });
+        return Err(ConfigError::Both {
+            one: list,
+            other: file,
+        });
     }
     let path = base.join(given);
     let first = params.file_first_vertex;

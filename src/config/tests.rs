@@ -578,7 +578,7 @@ fn cone_files_that_are_refused() {
     assert_eq!((at.line, at.column, at.offending()), (2, 3, "half"));
     assert!(error.remedy().contains("17 1.570796"), "{}", error.remedy());
     let error = refused("3 1.57\n", "list = [{ vertex = 0, curvature = 1 }]");
-    assert!(matches!(error, ConfigError::ListAndFile { .. }), "{error}");
+    assert!(matches!(error, ConfigError::Both { .. }), "{error}");
     let (folder, file) = with_cone_file("", "");
     std::fs::remove_file(folder.path().join("my.cones.txt")).expect("removed");
     let error = load(&file, &[]).expect_err("missing");
@@ -615,7 +615,7 @@ fn a_file_of_features_becomes_the_list() {
     assert_eq!((at.line, at.column, at.offending()), (2, 3, "x"));
     assert!(error.remedy().contains("`17 18 25`"), "{}", error.remedy());
     let error = written("1 2\n", "list = [[1, 2]]").expect_err("twice");
-    assert!(matches!(error, ConfigError::ListAndFile { .. }), "{error}");
+    assert!(matches!(error, ConfigError::Both { .. }), "{error}");
     for (list, place) in [("[[1]]", "[1]"), ("[[1, -2]]", "-2"), ("[7]", "7")] {
         let text = format!("[features]\nlist = {list}");
         let error = parse("f", &text, &[]).expect_err(list);

@@ -4,6 +4,7 @@
 //! *Guaranteed:* coordinates are multiples of 2⁻ᵏ (k as large as float64 holds them), so that what is computed from them is exact; every face has a positive area, or an error.
 
 use super::blocks::Blocks;
+use super::density::Units;
 use super::dirichlet::relax;
 use super::error::GridError;
 use super::map::{Anchor, Freedom, GridMap, is_turned_over};
@@ -36,7 +37,7 @@ pub(crate) fn cut(
     map: &mut GridMap,
     mesh: &QuadMesh,
     blocks: &Blocks,
-    cell_size: f64,
+    unit: &Units,
 ) -> Result<Vec<Option<Placed>>, GridError> {
     let mut is_wall = vec![[false; 4]; mesh.quads.len()];
     for block in &blocks.blocks {
@@ -84,7 +85,7 @@ pub(crate) fn cut(
         let square = square as u32;
         return Err(GridError::NoRectangle { square });
     }
-    settle(map, &placed, cell_size)?;
+    settle(map, &placed, unit)?;
     Ok(placed)
 }
 
@@ -143,7 +144,9 @@ fn draw(
     let target = [x.round() + dx, y.round() + dy];
     let aims = map.sheet.near(Aim { corner, target });
     let (q, k) = out.edge;
-    let v = map.sheet.draw(aims, 4 * q + u32::from(k), goal)?;
+    let freedom = &map.freedom;
+    let is_free = |v: VertexId| v.index() >= freedom.len() || freedom[v] == Freedom::Free;
+    let v = map.sheet.draw(aims, 4 * q + u32::from(k), goal, is_free)?;
     while map.freedom.len() < map.sheet.fine.connectivity.vertex_count() {
         map.freedom.push(Freedom::Free);
     }
@@ -221,7 +224,7 @@ impl QuadMesh {
 
 /// Puts vertices exactly where they are to be: those of lines on them, all on multiples of a power of two. In between the map is relaxed once more, since drawing
 /// lines squeezes a few faces.
-fn settle(map: &mut GridMap, placed: &[Option<Placed>], cell_size: f64) -> Result<(), GridError> {
+fn settle(map: &mut GridMap, placed: &[Option<Placed>], unit: &Units) -> Result<(), GridError> {
     let c = map.sheet.fine.connectivity.clone();
     for v in placed.iter().flatten().map(|p| p.vertex) {
         map.freedom[v] = Freedom::Fixed;
@@ -246,10 +249,10 @@ fn settle(map: &mut GridMap, placed: &[Option<Placed>], cell_size: f64) -> Resul
     let most = c.faces().flat_map(|f| map.corners(f)).flatten();
     let most = most.fold(1.0, |m: f64, x| m.max(x.abs()));
     let digits = (DIGITS - most.log2().ceil() as i32).min(MOST_DIGITS);
-    let unit = 0.5f64.powi(digits);
+    let least = 0.5f64.powi(digits);
     let round = |map: &mut GridMap| {
         for v in c.vertices() {
-            let mut place = map.place(v).map(|x| (x / unit).round() * unit);
+            let mut place = map.place(v).map(|x| (x / least).round() * least);
             match map.freedom[v] {
                 Freedom::Fixed => place = place.map(f64::round),
                 Freedom::Along(a) => {
@@ -263,7 +266,7 @@ fn settle(map: &mut GridMap, placed: &[Option<Placed>], cell_size: f64) -> Resul
     };
     round(map);
     thicken(map);
-    relax(map, cell_size)?;
+    relax(map, unit)?;
     round(map);
     thicken(map);
     round(map);

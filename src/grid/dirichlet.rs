@@ -7,6 +7,7 @@
 //! The Hessian of a face is made positive semidefinite by its eigenvalues, known in closed form (Smith, de Goes, Kim 2019); steps end before the first face loses its area (Smith, Schaefer 2015).
 
 use super::complex::turned;
+use super::density::Units;
 use super::error::GridError;
 use super::map::{Freedom, GridMap, double_area, is_turned_over};
 use crate::flow::solve::SymmetricSolver;
@@ -231,14 +232,15 @@ fn first_root(p: [[f64; 2]; 3], d: [[f64; 2]; 3]) -> f64 {
     positive.fold(f64::INFINITY, f64::min)
 }
 
-/// Moves vertices until the energy is least; see the module docs. `unit`: length of a side of a cell, source units.
-pub(crate) fn relax(map: &mut GridMap, unit: f64) -> Result<Relaxed, GridError> {
+/// Moves vertices until the energy is least; see the module docs.
+pub(crate) fn relax(map: &mut GridMap, unit: &Units) -> Result<Relaxed, GridError> {
     let c = &map.sheet.fine.connectivity;
     let position = &map.sheet.fine.position;
     let rest: Vec<Rest> = c
         .faces()
         .map(|f| {
             let in_space = c.face_vertices(f).map(|v| position[v]);
+            let unit = unit.of(map.sheet.fine.parent[f]);
             Rest::new(in_space, unit, map.corners(f))
         })
         .collect();

@@ -155,6 +155,7 @@ pub(crate) fn affine(
     lattice: &Lattice,
     vertex: &VertexVec<VertexId>,
     mesh: &QuadMesh,
+    may_move: impl Fn(VertexId) -> bool + Copy,
 ) -> Result<GridMap, GridError> {
     let complex = &lattice.complex;
     let mut sheet = Sheet::new(fine, turns, NEAR);
@@ -164,7 +165,7 @@ pub(crate) fn affine(
         }
         let aim = aim(&sheet, lattice, vertex, h)?;
         let aims = sheet.near(aim);
-        sheet.draw(aims, h.raw(), Some(vertex[complex.head(h)]))?;
+        sheet.draw(aims, h.raw(), Some(vertex[complex.head(h)]), may_move)?;
     }
     let under = flood(&sheet, lattice, vertex)?;
     let real = real_corners(lattice);

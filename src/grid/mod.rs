@@ -7,6 +7,7 @@ pub mod blocks;
 pub mod complex;
 pub mod cone_triangulation;
 pub(crate) mod cut;
+mod density;
 pub(crate) mod dirichlet;
 mod distortion;
 mod error;
@@ -28,17 +29,18 @@ mod walk;
 
 pub use distortion::Distortion;
 pub use error::GridError;
-pub use params::GridParams;
+pub use params::{Density, GridParams};
 pub(crate) use refine::refined;
 
 use crate::atlas::charted::{self, Charted};
 use crate::atlas::geometry_image::GeometryImage;
 use crate::atlas::patches::PatchLayout;
 use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{EdgeVec, FaceVec, HalfedgeId, HalfedgeVec, VertexId};
+use crate::geometry::ids::{EdgeVec, FaceVec, HalfedgeId, HalfedgeVec, VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, triangle_area};
 use crate::geometry::subdivision::Subdivision;
 use blocks::Blocks;
+use density::Units;
 use islands::Islands;
 use map::GridMap;
 use quads::QuadMesh;
@@ -185,11 +187,19 @@ fn made(
     for h in c.halfedges() {
         fine.corner[h].uv = central[c.face(h)][c.corner(h)];
     }
-    let mut map = map::affine(fine, turns, &lattice, &cones.vertex, &quads)?;
+    // Cones, and what lies on lines of the lattice.
+    let mut is_kept = VertexVec::filled(false, c.vertex_count());
+    cones.vertex.iter().for_each(|&v| is_kept[v] = true);
+    for (e, _) in lines.enumerate().filter(|(_, is_line)| **is_line) {
+        c.edge_vertices(e).iter().for_each(|&v| is_kept[v] = true);
+    }
+    let may_move = |v: VertexId| v.index() >= is_kept.len() || !is_kept[v];
+    let mut map = map::affine(fine, turns, &lattice, &cones.vertex, &quads, may_move)?;
     slivers::thicken(&mut map);
     let areas = c.faces().map(|f| triangle_area(mesh.face_positions(f)));
     let cell_size = (areas.sum::<f64>() / quads.quads.len() as f64).sqrt();
-    let relaxed = dirichlet::relax(&mut map, cell_size)?;
+    let unit = Units::new(mesh, cell_size, params.density)?;
+    let relaxed = dirichlet::relax(&mut map, &unit)?;
     tracing::debug!(
         cones = cones.vertex.len(),
         cells = quads.quads.len(),
@@ -198,7 +208,7 @@ fn made(
         energy = relaxed.energy[1],
         "grid"
     );
-    let placed = cut::cut(&mut map, &quads, &blocks, cell_size)?;
+    let placed = cut::cut(&mut map, &quads, &blocks, &unit)?;
     let located = layout::locate(&map, &quads, &blocks, &placed)?;
     let k = &map.sheet.fine.connectivity;
     let of_edges = |f, of: &dyn Fn(HalfedgeId) -> [i64; 2]| {

@@ -8,8 +8,23 @@ use serde::{Deserialize, Serialize};
 pub struct GridParams {
     /// Cells of a mesh, shared among its components by area: as near as its cones allow, which need about ten each.
     pub cells: usize,
+    /// Side of a cell, source units, from which the number of cells follows.
+    pub cell_size: Option<f64>,
+    /// Where cells are smaller.
+    pub density: Density,
     /// Texels on a side of a cell.
     pub samples_per_cell: usize,
+}
+
+/// Where cells are smaller than elsewhere.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Density {
+    /// Nowhere, as far as cones allow.
+    #[default]
+    Uniform,
+    /// Where the surface is curved.
+    Curvature,
 }
 
 impl GridParams {
@@ -24,6 +39,8 @@ impl Default for GridParams {
     fn default() -> Self {
         Self {
             cells: 2000,
+            cell_size: None,
+            density: Density::Uniform,
             samples_per_cell: 8,
         }
     }

@@ -6,6 +6,8 @@
 
 use super::complex::{cross, turned};
 use super::error::GridError;
+use super::map::double_area;
+use super::slivers::{THICK, thickness};
 use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, HalfedgeId, HalfedgeVec, NONE, VertexId};
 use crate::geometry::subdivision::Subdivision;
 
@@ -14,6 +16,12 @@ const LEAST_PART: f64 = 1e-12;
 
 /// The end of a line that is a vertex already is met where its distance is right to this part.
 const GOAL: f64 = 1e-3;
+
+/// Vertices inside that lie beside a line by less than this part of their distance from its last vertex are moved onto it, where that does no harm.
+const BESIDE: f64 = 0.05;
+
+/// Part of its thickness that a thin face keeps at least where a corner is moved.
+const KEPT: f64 = 0.1;
 
 /// Steps of a line that bring it no nearer to its end, after which it is given up: it runs to and fro between points that float64 does not tell apart.
 const MOST_STALLS: usize = 16;
@@ -173,7 +181,12 @@ impl Sheet {
     }
 
     /// Which corner a straight line takes, and how.
-    fn way(&self, aims: &[Aim], goal: Option<VertexId>) -> Option<(Aim, Way)> {
+    fn way(
+        &self,
+        aims: &[Aim],
+        goal: Option<VertexId>,
+        may_move: impl Fn(VertexId) -> bool,
+    ) -> Option<(Aim, Way)> {
         let c = &self.fine.connectivity;
         let is_along = |edge: [f64; 2], to: [f64; 2]| {
             dot(edge, to) > 0.0 && cross(edge, to).abs() <= self.near * length(edge) * length(to)
@@ -213,15 +226,58 @@ impl Sheet {
             let back = self.vector(c.prev(aim.corner)).map(|x| -x);
             cross(self.vector(aim.corner), to) >= 0.0 && cross(to, back) > 0.0
         });
-        into.map(|&aim| (aim, Way::Into))
+        let &aim = into?;
+        let way = self
+            .beside(aim, goal, may_move)
+            .map_or(Way::Into, Way::Along);
+        Some((aim, way))
     }
 
-    /// Draws a straight line to where `aims` say, seen from some corners of one vertex. The vertex where it ends: `goal`, if there is one already.
+    /// Of the edges of a corner, one whose other end may be moved onto a line that runs into the face beside it, which saves a thin face.
+    fn beside(
+        &self,
+        aim: Aim,
+        goal: Option<VertexId>,
+        may_move: impl Fn(VertexId) -> bool,
+    ) -> Option<HalfedgeId> {
+        let c = &self.fine.connectivity;
+        let (p, prev) = (self.at(aim.corner), c.prev(aim.corner));
+        let d = minus(aim.target, p);
+        let mut best: Option<(f64, HalfedgeId)> = None;
+        for (h, end) in [(aim.corner, c.next(aim.corner)), (prev, prev)] {
+            let (v, edge) = (c.tail(end), minus(self.at(end), p));
+            let off = cross(edge, d).abs() / (length(edge) * length(d));
+            let along = dot(edge, d) / dot(d, d);
+            if off > BESIDE || along <= 0.0 || along >= 1.0 - GOAL {
+                continue;
+            }
+            // Bearings around a vertex that stays are counted from its first halfedge.
+            let is_first = |h: HalfedgeId| {
+                let u = c.head(h);
+                !may_move(u) && c.head(c.vertex_halfedge(u)) == v
+            };
+            let is_kept = goal == Some(v)
+                || !may_move(v)
+                || c.is_boundary_vertex(v)
+                || c.outgoing(v)
+                    .any(|h| self.line[c.edge(h)] != NONE || is_first(h));
+            let by = minus([along * d[0], along * d[1]], edge);
+            let is_nearer = best.is_none_or(|(least, _)| off < least);
+            if is_nearer && !is_kept && self.moves_without_harm(end, by) {
+                best = Some((off, h));
+            }
+        }
+        best.map(|(_, h)| h)
+    }
+
+    /// Draws a straight line to where `aims` say, seen from some corners of one vertex. The vertex where it ends: `goal`, if there is one already. Vertices that `may_move` are moved
+    /// onto it where they lie beside it.
     pub fn draw(
         &mut self,
         aims: Vec<Aim>,
         line: u32,
         goal: Option<VertexId>,
+        may_move: impl Fn(VertexId) -> bool,
     ) -> Result<VertexId, GridError> {
         let mut aims = aims;
         let lost = |aims: &[Aim], sheet: &Sheet| GridError::Lost {
@@ -232,7 +288,9 @@ impl Sheet {
         };
         let (mut last, mut stalls) = (f64::INFINITY, 0);
         loop {
-            let (aim, way) = self.way(&aims, goal).ok_or_else(|| lost(&aims, self))?;
+            let (aim, way) = self
+                .way(&aims, goal, &may_move)
+                .ok_or_else(|| lost(&aims, self))?;
             let c = &self.fine.connectivity;
             let to = length(minus(aim.target, self.at(aim.corner)));
             // A straight line comes nearer with every step.
@@ -314,8 +372,28 @@ impl Sheet {
         }
     }
 
+    /// Whether no face around the vertex of a corner, around which nothing is curved, is turned over or becomes thin when it is moved.
+    fn moves_without_harm(&self, corner: HalfedgeId, by: [f64; 2]) -> bool {
+        let c = &self.fine.connectivity;
+        self.frames(corner).into_iter().all(|(h, turns)| {
+            let others = [c.next(h), c.prev(h)].map(|h| self.at(h));
+            let ([x, y], [a, b]) = (turned(by, turns), self.at(h));
+            let [old, new] = [[a, b], [a + x, b + y]].map(|p| [p, others[0], others[1]]);
+            double_area(new) > 0.0 && thickness(new) >= THICK.min(KEPT * thickness(old))
+        })
+    }
+
     /// Moves the vertex of a corner, around which nothing is curved, by what is given in the frame of its face.
     fn move_by(&mut self, corner: HalfedgeId, by: [f64; 2]) {
+        for (h, turns) in self.frames(corner) {
+            let [x, y] = turned(by, turns);
+            let [a, b] = self.at(h);
+            self.fine.corner[h].uv = [a + x, b + y];
+        }
+    }
+
+    /// The corners of the vertex of a corner, each with the quarter turns from that one's frame.
+    fn frames(&self, corner: HalfedgeId) -> Vec<(HalfedgeId, u8)> {
         let aim = Aim {
             corner,
             target: self.at(corner),
@@ -338,11 +416,7 @@ impl Sheet {
                 } & 3,
             );
         }
-        for (h, turns) in corners.into_iter().zip(turns) {
-            let [x, y] = turned(by, turns);
-            let [a, b] = self.at(h);
-            self.fine.corner[h].uv = [a + x, b + y];
-        }
+        corners.into_iter().zip(turns).collect()
     }
 
     /// Splits the edge of a halfedge, at a part of it from its tail.

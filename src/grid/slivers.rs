@@ -8,7 +8,7 @@ use crate::geometry::ids::{FaceId, VertexId};
 use std::collections::BTreeSet;
 
 /// Twice the area over the square of the longest side that faces are to have.
-const THICK: f64 = 1e-5;
+pub(super) const THICK: f64 = 1e-5;
 /// Rounds over the vertices of thin faces.
 const MOST_ROUNDS: usize = 50;
 /// Distances that a vertex is tried to be moved by: halves of the size of its star.
@@ -25,7 +25,7 @@ const DIRECTIONS: [[f64; 2]; 8] = [
 ];
 
 /// Twice the area over the square of the longest side.
-fn thickness(p: [[f64; 2]; 3]) -> f64 {
+pub(super) fn thickness(p: [[f64; 2]; 3]) -> f64 {
     let squared = |k: usize| {
         let (a, b) = (p[k], p[(k + 1) % 3]);
         (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2)

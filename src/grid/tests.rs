@@ -488,6 +488,7 @@ fn assert_gridded(squares: &Squares, cells: usize) -> super::Grid {
     let params = super::GridParams {
         cells,
         samples_per_cell: 3,
+        ..super::GridParams::default()
     };
     let mesh = mesh(squares);
     let (map, grid, located) =

@@ -21,8 +21,17 @@ const LEAST_CELLS: usize = 6;
 /// No longer side of a picture gets shorter.
 const LEAST_SIDE: usize = 2 * SIDE_RANGE[0];
 
-/// The part of what the configuration asks for that each component gets, in (0, 1].
-pub(super) fn shares(components: &[Component]) -> Vec<f64> {
+/// What each component is of the mesh.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Share {
+    /// The part of what the configuration asks for that it gets, in (0, 1].
+    part: f64,
+    /// Its area, square source units.
+    area: f64,
+}
+
+/// The shares of components.
+pub(super) fn shares(components: &[Component]) -> Vec<Share> {
     let area = |component: &Component| {
         let Ok(mesh) = &component.mesh else {
             return 0.0;
@@ -40,22 +49,29 @@ pub(super) fn shares(components: &[Component]) -> Vec<f64> {
     let areas: Vec<f64> = components.iter().map(area).collect();
     let whole = WHOLE * areas.iter().sum::<f64>();
     // Areas that float64 does not hold tell nothing.
-    let share = |area: f64| match whole.is_normal() {
-        true => (area / whole).min(1.0),
-        false => 1.0,
+    let share = |area: f64| Share {
+        part: match whole.is_normal() {
+            true => (area / whole).min(1.0),
+            false => 1.0,
+        },
+        area,
     };
     areas.into_iter().map(share).collect()
 }
 
 /// The configuration of a component with this share.
-pub(super) fn of_share(config: &Config, share: f64) -> Config {
+pub(super) fn of_share(config: &Config, Share { part: share, area }: Share) -> Config {
     let mut config = config.clone();
     let at_least = |whole: usize, part: f64, least: usize| {
         (whole as f64 * part).round().max(least.min(whole) as f64) as usize
     };
     config.patches.texel_budget =
         at_least(config.patches.texel_budget, share, LEAST_TEXELS).min(config.patches.texel_budget);
-    config.grid.cells = at_least(config.grid.cells, share, LEAST_CELLS);
+    config.grid.cells = match config.grid.cell_size {
+        // Too many are refused by the grid itself, with their number.
+        Some(size) => (area / (size * size)).round().max(1.0) as usize,
+        None => at_least(config.grid.cells, share, LEAST_CELLS),
+    };
     config.pictures.size =
         at_least(config.pictures.size, share, LEAST_SIDE).min(config.pictures.size);
     config
@@ -70,8 +86,9 @@ mod tests {
         let mut config = Config::default();
         config.patches.texel_budget = 100_000;
         config.pictures.size = 1000;
-        let of = |share: f64| {
-            let config = of_share(&config, share);
+        let share = |part| Share { part, area: 1.0 };
+        let of = |part: f64| {
+            let config = of_share(&config, share(part));
             (config.patches.texel_budget, config.pictures.size)
         };
         assert_eq!(of(1.0), (100_000, 1000));
@@ -79,10 +96,20 @@ mod tests {
         assert_eq!(of(0.0), (LEAST_TEXELS, LEAST_SIDE));
         config.patches.texel_budget = 1000;
         config.pictures.size = 64;
-        let small = of_share(&config, 0.01);
+        let small = of_share(&config, share(0.01));
         assert_eq!(
             (small.patches.texel_budget, small.pictures.size),
             (1000, 64)
         );
+        // Cells of a size are as many as have the area.
+        config.grid.cell_size = Some(0.1);
+        let sized = of_share(
+            &config,
+            Share {
+                area: 5.0,
+                ..share(0.01)
+            },
+        );
+        assert_eq!(sized.grid.cells, 500);
     }
 }

@@ -196,10 +196,15 @@ fn descending([x, y, z]: [f64; 3]) -> [f64; 3] {
 /// Tangents of half the corner angles from lengths: tan²(θ/2) = (products of side differences) / (products of side sums). Infinite
 /// for a straight angle.
 pub(super) fn half_tangents(l: [f64; 3]) -> [f64; 3] {
+    // The sum of two sides less the third, without a rounding of the sum (Kahan).
+    let room = |k: usize| {
+        let (b, c) = (l[(k + 1) % 3], l[(k + 2) % 3]);
+        b.min(c) - (l[k] - b.max(c))
+    };
+    let rooms = [0, 1, 2].map(room);
     std::array::from_fn(|k| {
-        let (a, b, c) = (l[k], l[(k + 1) % 3], l[(k + 2) % 3]);
-        let over = ((a - b) + c) * ((a + b) - c);
-        let under = (a + b + c) * ((b + c) - a);
+        let over = rooms[(k + 1) % 3] * rooms[(k + 2) % 3];
+        let under = (l[0] + l[1] + l[2]) * rooms[k];
         if over > 0.0 {
             (over / under.max(0.0)).sqrt()
         } else {
@@ -235,19 +240,23 @@ pub(super) fn least_sine(l: [f64; 3]) -> f64 {
     (0.5 * (long * short).max(0.0).sqrt()).min(1.0)
 }
 
-/// How far angles of a face may be off because its lengths are rounded (radians).
+/// How far angles of a face may be off because its lengths are rounded (radians): where it is thin, by the roundings of three lengths over its height.
 pub(super) fn angle_slack(l: [f64; 3]) -> f64 {
-    let thin = if least_sine(l) < 1e-7 { 3e-8 } else { 0.0 };
+    let sine = least_sine(l);
+    let thin = if sine < 1e-7 { 3e-8 } else { 4e-16 / sine };
     4e-15 * longest(l) / shortest(l) + thin
 }
 
-/// Corner angles, opposite to the lengths, by the law of cosines.
-pub(super) fn angles_by_cosines(l: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|k| {
+/// Corner angles, opposite to the lengths, by the law of cosines, and how far the contract lets them be off.
+pub(super) fn angles_by_cosines(l: [f64; 3]) -> ([f64; 3], f64) {
+    let angles: [f64; 3] = std::array::from_fn(|k| {
         let [a, b, c] = [l[k], l[(k + 1) % 3], l[(k + 2) % 3]];
         let cosine = (b * b + c * c - a * a) / (2.0 * b * c);
         cosine.clamp(-1.0, 1.0).acos()
-    })
+    });
+    let is_thin = angles.iter().any(|a| a.sin() < 1e-7);
+    let slack = 4e-15 * longest(l) / shortest(l) + if is_thin { 3e-8 } else { 0.0 };
+    (angles, slack)
 }
 
 /// Axis-aligned bounds of a set of points, with its diagonal and its distance from the origin.

@@ -64,13 +64,14 @@ pub(super) fn check(
         .map(|boundary| if *boundary { PI } else { TAU })
         .collect();
     let mut by_cosines = curvature.clone();
-    let mut blur = vec![0.0; vertices];
+    let (mut blur, mut blur_by_cosines) = (vec![0.0; vertices], vec![0.0; vertices]);
     let corners = arrays.faces.iter().zip(angles);
     for ((face, angle), l) in corners.zip(&arrays.flat_length) {
         let face_slack = angle_slack(*l);
-        let cosines = angles_by_cosines(*l);
+        let (cosines, slack_by_cosines) = angles_by_cosines(*l);
         for k in 0..3 {
             by_cosines[face[k] as usize] -= cosines[k];
+            blur_by_cosines[face[k] as usize] += slack_by_cosines;
             curvature[face[k] as usize] -= angle[k];
             blur[face[k] as usize] += face_slack;
         }
@@ -86,9 +87,9 @@ pub(super) fn check(
     let target = &arrays.target_curvature;
     let (mut inner, mut border) = (Worst::default(), Worst::default());
     for v in 0..vertices {
-        let error = |curvature: f64| ((curvature - target[v]).abs() - blur[v]).max(0.0);
+        let error = |curvature: f64, blur: f64| ((curvature - target[v]).abs() - blur).max(0.0);
         // Readers take the formula of the textbooks, which loses more digits: they must find the same.
-        let error = error(curvature[v]).max(error(by_cosines[v]));
+        let error = error(curvature[v], blur[v]).max(error(by_cosines[v], blur_by_cosines[v]));
         if free && surface.on_boundary[v] {
             border.see(error);
         } else {
