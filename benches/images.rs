@@ -2,7 +2,7 @@
 //!
 //! `cargo bench --bench images -- [--peers DIR] [--flat | --grid] MESH…`: 128², 256² and 512² texels in all images together, their margins included. DIR holds
 //! `NAME.TOOL.obj`, the mesh with the texture coordinates of a tool, as `benches/peers/atlases.py` writes them. PSNR is
-//! 20 log10(diagonal / symmetric RMS distance) of the mesh that is rebuilt from images and seam samples. `--flat` and `--grid` leave the other domain out. Flat images are those of
+//! 20 log10(diagonal / symmetric RMS distance) of the mesh that is rebuilt from images and seam samples. `--flat` and `--grid` leave the other domain out; grids are uniform, then by curvature. Flat images are those of
 //! `preset = "geometry-image-256"`, but without padding, as are charts of other programs. Nothing here is timed.
 
 mod common;
@@ -14,6 +14,7 @@ use affine_atlas::geometry::deviation::{Sampling, Triangles, deviation};
 use affine_atlas::geometry::frame::Frame;
 use affine_atlas::geometry::ids::{FaceVec, VertexVec};
 use affine_atlas::geometry::mesh::{AttributeKind, Mesh, Soup};
+use affine_atlas::grid::Density;
 use affine_atlas::rebuild::{Images, rebuild};
 use affine_atlas::{job, read, repair};
 use std::collections::HashSet;
@@ -34,16 +35,22 @@ const CELLS_ON_SIDE: usize = 32;
 /// Budgets that are tried until one is kept.
 const ROUNDS: usize = 8;
 
+/// Images of one's own: label, domain, and where cells are smaller.
+type Kind = (&'static str, Domain, Density);
+const UNIFORM: Kind = ("ours, grid", Domain::Grid, Density::Uniform);
+const BY_CURVATURE: Kind = ("ours, grid by curvature", Domain::Grid, Density::Curvature);
+const FLAT: Kind = ("ours, flat", Domain::Flat, Density::Uniform);
+
 fn main() -> Result<(), Box<dyn Error>> {
     let mut peers: Option<PathBuf> = None;
     let mut meshes: Vec<PathBuf> = Vec::new();
-    let mut domains = vec![Domain::Grid, Domain::Flat];
+    let mut kinds = vec![UNIFORM, BY_CURVATURE, FLAT];
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--peers" => peers = Some(arguments.next().ok_or("--peers needs a folder")?.into()),
-            "--flat" => domains = vec![Domain::Flat],
-            "--grid" => domains = vec![Domain::Grid],
+            "--flat" => kinds = vec![FLAT],
+            "--grid" => kinds = vec![UNIFORM, BY_CURVATURE],
             // What cargo adds.
             "--bench" => {}
             _ => meshes.push(argument.into()),
@@ -54,12 +61,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     for path in &meshes {
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
         let asset = read::read(path, &Default::default())?;
-        for &domain in &domains {
-            let label = match domain {
-                Domain::Flat => "ours, flat",
-                Domain::Grid => "ours, grid",
-            };
-            row(&name, label, |side| ours(&asset.soup, domain, side));
+        for &(label, domain, density) in &kinds {
+            row(&name, label, |side| {
+                ours(&asset.soup, domain, density, side)
+            });
         }
         for tool in ["xatlas", "lscm", "slim"] {
             let file = format!("{name}.{tool}.obj");
@@ -104,8 +109,14 @@ fn settings(domain: Domain) -> Result<Config, Box<dyn Error>> {
     Ok(config)
 }
 
-fn ours(soup: &Soup, domain: Domain, side: usize) -> Result<Found, Box<dyn Error>> {
+fn ours(
+    soup: &Soup,
+    domain: Domain,
+    density: Density,
+    side: usize,
+) -> Result<Found, Box<dyn Error>> {
     let mut config = settings(domain)?;
+    config.grid.density = density;
     match domain {
         Domain::Flat => {
             config.patches.texel_budget = side * side;

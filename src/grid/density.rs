@@ -114,8 +114,11 @@ fn curvature(mesh: &Mesh, areas: &FaceVec<f64>, size: f64) -> Result<VertexVec<f
             let apex = p(c.prev(h));
             let (a, b) = (sub(p(h), apex), sub(p(c.next(h)), apex));
             let cotangent = dot(a, b) / norm(cross(a, b));
-            // Of a face without area it is no number.
-            cotangent.max(LEAST_COTANGENT).min(MOST_COTANGENT)
+            // Of a face without area it may be no number.
+            match cotangent.is_nan() {
+                true => LEAST_COTANGENT,
+                false => cotangent.clamp(LEAST_COTANGENT, MOST_COTANGENT),
+            }
         });
         let weight = 0.5 * size * size * cotangents.sum::<f64>();
         ends.iter().for_each(|v| diagonal[v.index()] += weight);

@@ -548,12 +548,13 @@ fn a_grid_of_squares_is_an_isometry() {
             grid.distortion.edge_ratio.p05,
             grid.distortion.edge_ratio.p95,
         ];
+        // Vertices beside lines were moved onto them; Newton's method brings them back until a step gains less than 1e-4 of the energy, whose root is what lengths are off by.
         assert!(
-            (p05 - 1.0).abs() < 1e-6 && (p95 - 1.0).abs() < 1e-6,
+            (p05 - 1.0).abs() < 1e-5 && (p95 - 1.0).abs() < 1e-5,
             "{p05} {p95}"
         );
         assert!(grid.distortion.symmetric_dirichlet.max < 4.0 + 1e-6);
-        assert!(grid.distortion.angle.max < 1e-6);
+        assert!(grid.distortion.angle.max < 1e-5);
     }
 }
 
