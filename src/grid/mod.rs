@@ -109,7 +109,8 @@ const MOST_RANGE: f64 = 30.0;
 /// Refuses metrics in which some places are too large beside others.
 pub(crate) fn check_range(log_scale: &[f64]) -> Result<(), GridError> {
     let ends = |(low, high): (f64, f64), &x: &f64| (low.min(x), high.max(x));
-    let (low, high) = log_scale.iter().fold((0.0, 0.0), ends);
+    let none = (f64::INFINITY, f64::NEG_INFINITY);
+    let (low, high) = log_scale.iter().fold(none, ends);
     let (range, most) = (high - low, MOST_RANGE);
     match range > most {
         true => Err(GridError::Range { range, most }),
