@@ -35,6 +35,9 @@ const SEAMLESS: &[&str] = &[
     "report.enabled=false",
 ];
 
+/// Numbers of cells beside the default.
+const OTHER_CELLS: [&str; 3] = ["grid.cells=200", "grid.cells=500", "grid.cells=8000"];
+
 /// Most Newton steps to a seamless metric, and the largest standard deviation of its log scale; measured: 3 to 15, 0.03 to 0.09.
 const SEAMLESS_STEPS: u64 = 15;
 const SEAMLESS_STD: f64 = 0.13;
@@ -73,11 +76,14 @@ fn main() {
         for file in corpus.iter().flat_map(|c| models(&c.join(folder))) {
             let name = file.file_name().unwrap_or_default().to_string_lossy();
             let name = format!("{folder}/{name}");
-            add(
-                name,
-                false,
-                Box::new(move |_: &Path| atlas_or_refusal(&file)),
-            );
+            let model = file.clone();
+            let run = move |_: &Path| atlas_or_refusal(&model, &[]);
+            add(name.clone(), false, Box::new(run));
+            for cells in OTHER_CELLS {
+                let model = file.clone();
+                let run = move |_: &Path| atlas_or_refusal(&model, &[cells]);
+                add(format!("{cells}/{name}"), true, Box::new(run));
+            }
         }
     }
     for (file, genus, loops) in CLEAN {
@@ -104,6 +110,10 @@ fn main() {
             let run = move |corpus: &Path| texture_coordinates(&corpus.join(file));
             add(format!("texcoord/{file}"), is_large, Box::new(run));
         }
+    }
+    for genus in [5, 24, 100] {
+        let run = move |_: &Path| plate_on_grids(genus);
+        add(format!("grid/genus{genus}"), genus > 24, Box::new(run));
     }
     for genus in [5, 24, 47, 100] {
         let run = move |_: &Path| seamless_plate(genus);
@@ -291,12 +301,25 @@ fn texture_coordinates(model: &Path) -> Result<(), Failed> {
     }
 }
 
-/// The same on generated surfaces of higher genus.
-fn seamless_plate(genus: usize) -> Result<(), Failed> {
+/// A generated surface of higher genus in a temporary folder.
+fn plate(genus: usize) -> Result<(tempfile::TempDir, PathBuf), Failed> {
     let folder = tempfile::tempdir()?;
     let model = folder.path().join(format!("genus{genus}.obj"));
     std::fs::write(&model, obj(&rounded(genus)))?;
+    Ok((folder, model))
+}
+
+/// The same on generated surfaces of higher genus.
+fn seamless_plate(genus: usize) -> Result<(), Failed> {
+    let (_folder, model) = plate(genus)?;
     seamless(&model, genus, 0)
+}
+
+/// Grids of several numbers of cells on these.
+fn plate_on_grids(genus: usize) -> Result<(), Failed> {
+    let (_folder, model) = plate(genus)?;
+    let build = |settings: &[&str]| build_one(&model, settings).map_err(failed);
+    Ok(grids(&model, build)?)
 }
 
 /// Fig. 8, 20 and 21: all curvature at one vertex.
@@ -387,8 +410,8 @@ fn quarter_turns(corpus: &Path) -> Result<(), Failed> {
 }
 
 /// Any file must end in atlases that pass, on grids, or in a refusal that says why; never in a panic.
-fn atlas_or_refusal(model: &Path) -> Result<(), Failed> {
-    let settings = ["pictures.enabled=false"];
+fn atlas_or_refusal(model: &Path, settings: &[&str]) -> Result<(), Failed> {
+    let settings = [&["pictures.enabled=false"], settings].concat();
     let built = build(model, &settings)?;
     let said = text(&built.output.stderr) + &text(&built.output.stdout);
     let atlases = built.atlases();

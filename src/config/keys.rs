@@ -5,6 +5,7 @@
 //! the line that [`Key::describe`] gives (a test asserts it).
 
 use super::presets;
+use crate::grid::MOST_CELLS;
 use std::fmt;
 
 /// What values a key takes. Bounds are inclusive.
@@ -532,7 +533,7 @@ pub const KEYS: &[Key] = &[
         "grid.cells",
         Kind::Integer {
             min: 1,
-            max: 1_000_000,
+            max: MOST_CELLS as i64,
         },
         "cells",
         "2000",

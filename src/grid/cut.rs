@@ -4,40 +4,44 @@
 //! *Guaranteed:* coordinates are multiples of 2⁻ᵏ (k as large as float64 holds them), so that what is computed from them is exact; every face has a positive area, or an error.
 
 use super::blocks::Blocks;
+use super::cells::unfold;
 use super::density::Units;
-use super::dirichlet::relax;
+use super::dirichlet;
 use super::error::GridError;
 use super::map::{Anchor, Freedom, GridMap, is_turned_over};
 use super::quads::QuadMesh;
 use super::sheet::Aim;
 use super::slivers::thicken;
 use crate::geometry::ids::{FaceId, HalfedgeId, NONE, VertexId};
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::f64::consts::FRAC_PI_2;
 
 /// Binary digits behind the point that coordinates have at most.
 const MOST_DIGITS: i32 = 40;
+/// ‖J‖² + ‖J⁻¹‖² above which a face counts as squeezed: 4 is an isometry.
+const SQUEEZED: f64 = 32.0;
 /// Binary digits in all that leave room for differences.
 const DIGITS: i32 = 51;
 
 /// An edge of the quad mesh that leaves a point: a side of a square run forwards, with the square on its left, or backwards along the border.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Out {
-    edge: (u32, u8),
-    is_backwards: bool,
+pub(super) struct Out {
+    pub edge: (u32, u8),
+    pub is_backwards: bool,
     /// Angle in quarter turns from the anchor's edge.
-    turns: i32,
+    pub turns: i32,
 }
 
 /// A point of the quad mesh that is a vertex.
 pub(crate) type Placed = Anchor;
 
-/// Draws borders; see the module docs. The vertex of every point of the quad mesh that lies on one.
+/// Draws borders; see the module docs. `unfolded`: vertices that moved when cells were unfolded. The vertex of every point of the quad mesh that lies on one.
 pub(crate) fn cut(
     map: &mut GridMap,
     mesh: &QuadMesh,
     blocks: &Blocks,
     unit: &Units,
+    unfolded: &BTreeSet<VertexId>,
 ) -> Result<Vec<Option<Placed>>, GridError> {
     let mut is_wall = vec![[false; 4]; mesh.quads.len()];
     for block in &blocks.blocks {
@@ -85,7 +89,7 @@ pub(crate) fn cut(
         let square = square as u32;
         return Err(GridError::NoRectangle { square });
     }
-    settle(map, &placed, unit)?;
+    settle(map, mesh, &placed, unit, unfolded)?;
     Ok(placed)
 }
 
@@ -187,7 +191,7 @@ impl QuadMesh {
     }
 
     /// All edges that leave the point where a side begins.
-    fn around(&self, edge: (u32, u8)) -> Vec<Out> {
+    pub(super) fn around(&self, edge: (u32, u8)) -> Vec<Out> {
         let of = |(q, k): (u32, u8)| self.across[q as usize][usize::from(k & 3)];
         let out = |edge, is_backwards, turns| Out {
             edge,
@@ -222,9 +226,38 @@ impl QuadMesh {
     }
 }
 
+/// Relaxes the map after drawing, which squeezes a few faces. Where cells were unfolded it stays, but about such faces.
+fn relax_drawn(
+    map: &mut GridMap,
+    unit: &Units,
+    unfolded: &BTreeSet<VertexId>,
+) -> Result<(), GridError> {
+    let c = &map.sheet.fine.connectivity;
+    let mut kept = unfolded.clone();
+    // New ones beside those that moved.
+    let around = unfolded.iter().flat_map(|&v| c.outgoing(v));
+    kept.extend(around.map(|h| c.head(h)));
+    for (f, _) in dirichlet::densities(map, unit).filter(|(_, density)| *density > SQUEEZED) {
+        c.face_vertices(f).iter().for_each(|v| {
+            kept.remove(v);
+        });
+    }
+    let freedom = map.freedom.clone();
+    kept.iter().for_each(|&v| map.freedom[v] = Freedom::Fixed);
+    let relaxed = dirichlet::relax(map, unit);
+    map.freedom = freedom;
+    relaxed.map(|_| ())
+}
+
 /// Puts vertices exactly where they are to be: those of lines on them, all on multiples of a power of two. In between the map is relaxed once more, since drawing
 /// lines squeezes a few faces.
-fn settle(map: &mut GridMap, placed: &[Option<Placed>], unit: &Units) -> Result<(), GridError> {
+fn settle(
+    map: &mut GridMap,
+    mesh: &QuadMesh,
+    placed: &[Option<Placed>],
+    unit: &Units,
+    unfolded: &BTreeSet<VertexId>,
+) -> Result<(), GridError> {
     let c = map.sheet.fine.connectivity.clone();
     for v in placed.iter().flatten().map(|p| p.vertex) {
         map.freedom[v] = Freedom::Fixed;
@@ -266,7 +299,8 @@ fn settle(map: &mut GridMap, placed: &[Option<Placed>], unit: &Units) -> Result<
     };
     round(map);
     thicken(map);
-    relax(map, unit)?;
+    relax_drawn(map, unit, unfolded)?;
+    unfold(map, mesh, unit)?;
     round(map);
     thicken(map);
     round(map);

@@ -9,9 +9,9 @@
 use super::complex::turned;
 use super::density::Units;
 use super::error::GridError;
-use super::map::{Freedom, GridMap, double_area, is_turned_over};
-use crate::flow::solve::SymmetricSolver;
-use crate::geometry::ids::{FaceId, HalfedgeVec, VertexVec};
+use super::map::{Corners, GridMap, double_area, is_turned_over};
+use super::system::{self, Derivatives, System};
+use crate::geometry::ids::FaceId;
 use rayon::prelude::*;
 
 /// Most steps.
@@ -26,8 +26,6 @@ const MOST_HALVINGS: usize = 30;
 /// Faces whose height in space is less than this part of their longest side are slivers, where edges of two triangulations nearly meet. They say nothing about the shape of the surface:
 /// the energy is to keep them as they are at first.
 const SLIVER: f64 = 1e-4;
-/// What is added to the diagonal, part of it, where rounding keeps the factor from being positive.
-const DAMPINGS: [f64; 4] = [0.0, 1e-12, 1e-9, 1e-6];
 /// Faces a piece of work has at least.
 const PIECE: usize = 1024;
 
@@ -108,7 +106,7 @@ impl Rest {
     }
 
     /// Gradient and positive semidefinite Hessian by the six coordinates of the corners.
-    fn derivatives(&self, corners: [[f64; 2]; 3]) -> ([f64; 6], [[f64; 6]; 6]) {
+    fn derivatives(&self, corners: [[f64; 2]; 3]) -> Derivatives {
         let j = self.jacobian(corners);
         // J = U Σ Vᵀ with rotations U and V: singular values by half sums and differences.
         let (e, f) = (0.5 * (j[0][0] + j[1][1]), 0.5 * (j[0][0] - j[1][1]));
@@ -174,26 +172,15 @@ impl Rest {
 struct Problem<'a> {
     map: &'a GridMap,
     rest: Vec<Rest>,
-    /// Of every corner: its vertex and the frame that it is seen in.
-    corner: HalfedgeVec<(u32, u8, [i64; 2])>,
+    corners: Corners,
 }
 
 impl Problem<'_> {
-    /// Corners of a face for places of vertices, seen from their first corners.
-    fn corners(&self, f: usize, place: &[[f64; 2]]) -> [[f64; 2]; 3] {
-        let corner = &self.corner.as_slice()[3 * f..3 * f + 3];
-        std::array::from_fn(|k| {
-            let (v, turns, shift) = corner[k];
-            let [x, y] = turned(place[v as usize], turns);
-            [x + shift[0] as f64, y + shift[1] as f64]
-        })
-    }
-
     /// Infinite where a face has no area.
     fn energy(&self, place: &[[f64; 2]]) -> f64 {
         let of_face = self.rest.par_iter().enumerate().with_min_len(PIECE);
         let energies: Vec<f64> = of_face
-            .map(|(f, rest)| rest.energy(self.corners(f, place)))
+            .map(|(f, rest)| rest.energy(self.corners.corners(FaceId::new(f), place)))
             .collect();
         energies.iter().sum()
     }
@@ -202,13 +189,10 @@ impl Problem<'_> {
     fn longest(&self, place: &[[f64; 2]], step: &[[f64; 2]]) -> f64 {
         let of_face = (0..self.rest.len()).into_par_iter().with_min_len(PIECE);
         let longest = of_face.map(|f| {
-            let p = self.corners(f, place);
-            let corner = &self.corner.as_slice()[3 * f..3 * f + 3];
-            let d: [[f64; 2]; 3] = std::array::from_fn(|k| {
-                let (v, turns, _) = corner[k];
-                turned(step[v as usize], turns)
-            });
-            first_root(p, d)
+            let f = FaceId::new(f);
+            let (vertices, turns) = (self.corners.vertices(f), self.corners.turns(f));
+            let d = [0, 1, 2].map(|k| turned(step[vertices[k] as usize], turns[k]));
+            first_root(self.corners.corners(f, place), d)
         });
         longest.reduce(|| f64::INFINITY, f64::min)
     }
@@ -232,45 +216,40 @@ fn first_root(p: [[f64; 2]; 3], d: [[f64; 2]; 3]) -> f64 {
     positive.fold(f64::INFINITY, f64::min)
 }
 
+fn rest(map: &GridMap, unit: &Units, f: FaceId) -> Rest {
+    let fine = &map.sheet.fine;
+    let in_space = fine.connectivity.face_vertices(f).map(|v| fine.position[v]);
+    Rest::new(in_space, unit.of(fine.parent[f]), map.corners(f))
+}
+
+/// ‖J‖² + ‖J⁻¹‖² of every face.
+pub(super) fn densities(map: &GridMap, unit: &Units) -> impl Iterator<Item = (FaceId, f64)> {
+    map.sheet.fine.connectivity.faces().map(|f| {
+        let rest = rest(map, unit, f);
+        (f, rest.energy(map.corners(f)) / rest.area)
+    })
+}
+
 /// Moves vertices until the energy is least; see the module docs.
 pub(crate) fn relax(map: &mut GridMap, unit: &Units) -> Result<Relaxed, GridError> {
     let c = &map.sheet.fine.connectivity;
-    let position = &map.sheet.fine.position;
-    let rest: Vec<Rest> = c
-        .faces()
-        .map(|f| {
-            let in_space = c.face_vertices(f).map(|v| position[v]);
-            let unit = unit.of(map.sheet.fine.parent[f]);
-            Rest::new(in_space, unit, map.corners(f))
-        })
-        .collect();
+    let rest: Vec<Rest> = c.faces().map(|f| rest(map, unit, f)).collect();
     let total: f64 = rest.iter().map(|r| r.area).sum();
-    let mut corner = HalfedgeVec::filled((0, 0, [0; 2]), c.halfedge_count());
-    let mut place = Vec::with_capacity(c.vertex_count());
-    for v in c.vertices() {
-        for (h, turns, shift) in map.frames(v) {
-            corner[h] = (v.raw(), turns, shift);
-        }
-        place.push(map.sheet.at(c.vertex_halfedge(v)));
-    }
-    let problem = Problem { map, rest, corner };
+    let mut place: Vec<[f64; 2]> = c.vertices().map(|v| map.place(v)).collect();
+    let corners = Corners::new(map);
+    let problem = Problem { map, rest, corners };
     let first = problem.energy(&place);
     if !first.is_finite() {
-        let flat = |f: &FaceId| problem.corners(f.index(), &place);
+        let flat = |f: &FaceId| problem.corners.corners(*f, &place);
         let over: Vec<FaceId> = c.faces().filter(|f| is_turned_over(flat(f))).collect();
         let face = over.first().copied().unwrap_or(FaceId::new(0));
         let count = over.len();
         return Err(GridError::TurnedOver { count, face });
     }
-    let mut solver = SymmetricSolver::with_blocks(2 * place.len(), 2, &problem.pairs())?;
+    let mut solver = system::solver(problem.vertices(), place.len())?;
     let (mut energy, mut steps) = (first, 0);
     while steps < MOST_STEPS {
-        let (gradient, diagonal, off_diagonal) = problem.system(&place);
-        factorize(&mut solver, &diagonal, &off_diagonal)?;
-        let mut step: Vec<f64> = gradient.iter().map(|g| -g).collect();
-        solver.solve(&mut step);
-        let slope: f64 = step.iter().zip(&gradient).map(|(s, g)| s * g).sum();
-        let step: Vec<[f64; 2]> = step.chunks_exact(2).map(|s| [s[0], s[1]]).collect();
+        let (step, slope) = problem.system(&place).newton_step(&mut solver)?;
         let mut length = (BEFORE_FLAT * problem.longest(&place, &step)).min(1.0);
         let mut found = None;
         for _ in 0..MOST_HALVINGS {
@@ -295,112 +274,38 @@ pub(crate) fn relax(map: &mut GridMap, unit: &Units) -> Result<Relaxed, GridErro
             break;
         }
     }
-    let vertices = problem.map.sheet.fine.connectivity.vertices();
-    drop(problem);
-    for (v, place) in vertices.zip(place) {
-        map.put(v, place);
-    }
+    let corners = problem.corners;
+    corners.put(map, &place);
     Ok(Relaxed {
         steps,
         energy: [first / total, energy / total],
     })
 }
 
-/// Factorises, with as little damping as does.
-fn factorize(
-    solver: &mut SymmetricSolver,
-    diagonal: &[f64],
-    off_diagonal: &[f64],
-) -> Result<(), GridError> {
-    let mut result = Ok(());
-    for damping in DAMPINGS {
-        let damped: Vec<f64> = diagonal.iter().map(|d| d * (1.0 + damping)).collect();
-        result = solver.factorize(&damped, off_diagonal);
-        if result.is_ok() {
-            break;
-        }
-    }
-    Ok(result?)
-}
-
-/// Gradient, diagonal and one value a pair.
-type System = (Vec<f64>, Vec<f64>, Vec<f64>);
-
 impl Problem<'_> {
-    /// Couplings of coordinates, face by face: those of a corner, then those of two.
-    fn pairs(&self) -> Vec<[u32; 2]> {
-        let mut pairs = Vec::with_capacity(15 * self.rest.len());
-        for corner in self.corner.as_slice().chunks_exact(3) {
-            for (v, ..) in corner {
-                pairs.push([2 * v, 2 * v + 1]);
-            }
-            for k in 0..3 {
-                let [v, w] = [corner[k].0, corner[(k + 1) % 3].0];
-                for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                    pairs.push([2 * v + a, 2 * w + b]);
-                }
-            }
-        }
-        pairs
+    /// Vertices of every face.
+    fn vertices(&self) -> impl Iterator<Item = [u32; 3]> {
+        (0..self.rest.len()).map(|f| self.corners.vertices(FaceId::new(f)))
     }
 
-    /// Values for [`pairs`](Self::pairs); coordinates that may not move are coupled with nothing.
+    /// Derivatives at given places.
     fn system(&self, place: &[[f64; 2]]) -> System {
         let of_face = self.rest.par_iter().enumerate().with_min_len(PIECE);
         let faces: Vec<_> = of_face
-            .map(|(f, rest)| rest.derivatives(self.corners(f, place)))
-            .collect();
-        let n = place.len();
-        let freedom: &VertexVec<Freedom> = &self.map.freedom;
-        let is_free: Vec<bool> = freedom
-            .iter()
-            .flat_map(|f| match f {
-                Freedom::Fixed => [false; 2],
-                Freedom::Along(a) => [*a == 0, *a == 1],
-                Freedom::Free => [true; 2],
+            .map(|(f, rest)| {
+                let f = FaceId::new(f);
+                let (g, h) = rest.derivatives(self.corners.corners(f, place));
+                // In the frame of each vertex: turned back.
+                turned_back(&g, &h, self.corners.turns(f))
             })
             .collect();
-        let (mut gradient, mut diagonal) = (vec![0.0; 2 * n], vec![0.0; 2 * n]);
-        let mut off_diagonal = Vec::with_capacity(15 * self.rest.len());
-        for ((g, h), corner) in faces.iter().zip(self.corner.as_slice().chunks_exact(3)) {
-            // In the frame of each vertex: turned back.
-            let (g, h) = turned_back(g, h, [corner[0].1, corner[1].1, corner[2].1]);
-            let index = |k: usize, a: usize| 2 * corner[k].0 as usize + a;
-            let value = |i: [usize; 2], j: [usize; 2]| {
-                let both = is_free[index(i[0], i[1])] && is_free[index(j[0], j[1])];
-                if both {
-                    h[2 * i[0] + i[1]][2 * j[0] + j[1]]
-                } else {
-                    0.0
-                }
-            };
-            for k in 0..3 {
-                for a in 0..2 {
-                    if is_free[index(k, a)] {
-                        gradient[index(k, a)] += g[2 * k + a];
-                        diagonal[index(k, a)] += h[2 * k + a][2 * k + a];
-                    }
-                }
-                off_diagonal.push(value([k, 0], [k, 1]));
-            }
-            for k in 0..3 {
-                let next = (k + 1) % 3;
-                for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                    off_diagonal.push(value([k, a], [next, b]));
-                }
-            }
-        }
-        for (d, free) in diagonal.iter_mut().zip(&is_free) {
-            if !free {
-                *d = 1.0;
-            }
-        }
-        (gradient, diagonal, off_diagonal)
+        let is_free: Vec<[bool; 2]> = self.map.freedom.iter().map(|f| f.axes()).collect();
+        System::new(self.vertices().zip(&faces), &is_free)
     }
 }
 
 /// Gradient and Hessian by coordinates in frames that so many quarter turns take to the face's.
-fn turned_back(g: &[f64; 6], h: &[[f64; 6]; 6], turns: [u8; 3]) -> ([f64; 6], [[f64; 6]; 6]) {
+fn turned_back(g: &[f64; 6], h: &[[f64; 6]; 6], turns: [u8; 3]) -> Derivatives {
     // Coordinate a of corner k is sign times coordinate from[a] of the face's frame.
     let source = |i: usize| -> (usize, f64) {
         let (k, a) = (i / 2, i % 2);

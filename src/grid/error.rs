@@ -93,6 +93,22 @@ pub enum GridError {
         /// Most that are made.
         most: f64,
     },
+    /// Cells of the size that was asked for would be too many.
+    #[error(
+        "grid.cell_size = {size} asks for {cells:.3e} cells on an area of {area:.3e} square units, and a grid has at most {most}: at least {least:.3e} is possible"
+    )]
+    CellSize {
+        /// Side of a cell, source units.
+        size: f64,
+        /// Area of the component, square source units.
+        area: f64,
+        /// Area over that of a cell.
+        cells: f64,
+        /// Most that are made.
+        most: usize,
+        /// The size at which there are as many.
+        least: f64,
+    },
     /// A face has no area on the lattice.
     #[error("face {face} of the cone triangulation has no area on the lattice")]
     NoArea {

@@ -30,6 +30,17 @@ pub(crate) enum Freedom {
     Free,
 }
 
+impl Freedom {
+    /// Whether it may move along each axis.
+    pub(super) fn axes(self) -> [bool; 2] {
+        match self {
+            Self::Fixed => [false; 2],
+            Self::Along(axis) => [axis == 0, axis == 1],
+            Self::Free => [true; 2],
+        }
+    }
+}
+
 /// A surface with grid coordinates.
 pub(crate) struct GridMap {
     /// `corner[h].uv`: grid coordinates, cells; turns are those between their frames.
@@ -126,6 +137,53 @@ impl GridMap {
         );
         let turn = super::complex::cross(old, now).atan2(old[0] * now[0] + old[1] * now[1]);
         anchor.bearing - turn
+    }
+}
+
+/// From which frame every corner sees its vertex: q = R^turns p + shift, where p is its place from the first corner.
+pub(super) struct Corners(HalfedgeVec<(u32, u8, [i64; 2])>);
+
+impl Corners {
+    pub fn new(map: &GridMap) -> Self {
+        let c = &map.sheet.fine.connectivity;
+        let mut corner = HalfedgeVec::filled((0, 0, [0; 2]), c.halfedge_count());
+        for v in c.vertices() {
+            for (h, turns, shift) in map.frames(v) {
+                corner[h] = (v.raw(), turns, shift);
+            }
+        }
+        Self(corner)
+    }
+
+    fn of(&self, f: FaceId) -> &[(u32, u8, [i64; 2])] {
+        &self.0.as_slice()[3 * f.index()..3 * f.index() + 3]
+    }
+
+    /// Vertices of a face.
+    pub fn vertices(&self, f: FaceId) -> [u32; 3] {
+        [0, 1, 2].map(|k| self.of(f)[k].0)
+    }
+
+    /// Quarter turns of the corners of a face.
+    pub fn turns(&self, f: FaceId) -> [u8; 3] {
+        [0, 1, 2].map(|k| self.of(f)[k].1)
+    }
+
+    /// Corners of a face for places of vertices.
+    pub fn corners(&self, f: FaceId, place: &[[f64; 2]]) -> [[f64; 2]; 3] {
+        [0, 1, 2].map(|k| Self::seen(&self.of(f)[k], place))
+    }
+
+    /// Puts every vertex somewhere.
+    pub fn put(&self, map: &mut GridMap, place: &[[f64; 2]]) {
+        for (h, corner) in self.0.enumerate() {
+            map.sheet.fine.corner[h].uv = Self::seen(corner, place);
+        }
+    }
+
+    fn seen((v, turns, shift): &(u32, u8, [i64; 2]), place: &[[f64; 2]]) -> [f64; 2] {
+        let [x, y] = turned(place[*v as usize], *turns);
+        [x + shift[0] as f64, y + shift[1] as f64]
     }
 }
 

@@ -4,6 +4,7 @@
 //! whole numbers of cells; [`quads`] are the unit squares of that lattice, and [`blocks`] rectangles of them. `map` takes the surface there, `dirichlet` makes the map one of little distortion, `cut` draws the borders of blocks on the surface.
 
 pub mod blocks;
+mod cells;
 pub mod complex;
 pub mod cone_triangulation;
 pub(crate) mod cut;
@@ -23,13 +24,15 @@ pub mod quantise;
 mod refine;
 pub(crate) mod sheet;
 pub(crate) mod slivers;
+mod squares;
+mod system;
 #[cfg(test)]
 mod tests;
 mod walk;
 
 pub use distortion::Distortion;
 pub use error::GridError;
-pub use params::{Density, GridParams};
+pub use params::{Density, GridParams, MOST_CELLS};
 pub(crate) use refine::refined;
 
 use crate::atlas::charted::{self, Charted};
@@ -201,15 +204,17 @@ fn made(
     let cell_size = (areas.sum::<f64>() / quads.quads.len() as f64).sqrt();
     let unit = Units::new(mesh, cell_size, params.density)?;
     let relaxed = dirichlet::relax(&mut map, &unit)?;
+    let unfolded = cells::unfold(&mut map, &quads, &unit)?;
     tracing::debug!(
         cones = cones.vertex.len(),
         cells = quads.quads.len(),
         blocks = blocks.blocks.len(),
         steps = relaxed.steps,
         energy = relaxed.energy[1],
+        unfolded = unfolded.len(),
         "grid"
     );
-    let placed = cut::cut(&mut map, &quads, &blocks, &unit)?;
+    let placed = cut::cut(&mut map, &quads, &blocks, &unit, &unfolded)?;
     let located = layout::locate(&map, &quads, &blocks, &placed)?;
     let k = &map.sheet.fine.connectivity;
     let of_edges = |f, of: &dyn Fn(HalfedgeId) -> [i64; 2]| {

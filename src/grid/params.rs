@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Cells of a grid, at most: a quad mesh of them takes some 500 MB.
+pub const MOST_CELLS: usize = 1_000_000;
+
 /// `[grid]`: the integer grid, where `images.domain = "grid"`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]

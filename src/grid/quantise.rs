@@ -9,12 +9,11 @@
 use super::complex::{Complex, turned};
 use super::error::GridError;
 use super::lattice::{Lattice, UNIT};
+use super::params::MOST_CELLS;
 use super::walk::{Entry, State, Walks};
 use crate::geometry::ids::{FaceId, HalfedgeId, VertexVec};
 use std::collections::{BTreeMap, BinaryHeap};
 
-/// Most cells: a quad mesh of them takes some 5 GB.
-const MOST_CELLS: f64 = 1e7;
 /// Most cells for every one that is wanted or cone there is, and beside those.
 const MOST_FOR_CELL: f64 = 32.0;
 const MOST_BESIDE: f64 = 20_000.0;
@@ -43,9 +42,9 @@ const MOST_SIZES: usize = 6;
 
 /// Steps for about as many cells as are wanted: as near as can be, but no fewer than the cones need.
 pub fn quantise(complex: &Complex, vertices: usize, cells: f64) -> Result<Lattice, GridError> {
-    let is_number = (1.0..=MOST_CELLS).contains(&cells);
+    let most = MOST_CELLS as f64;
+    let is_number = (1.0..=most).contains(&cells);
     if !is_number {
-        let most = MOST_CELLS;
         return Err(GridError::Cells { cells, most });
     }
     let area: f64 = complex.faces().map(|f| 0.5 * complex.double_area(f)).sum();

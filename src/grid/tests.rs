@@ -495,6 +495,26 @@ fn assert_gridded(squares: &Squares, cells: usize) -> super::Grid {
         super::made(&mesh, &squares.uv, &squares.is_line, &params, 2).unwrap();
     let c = &map.sheet.fine.connectivity;
     c.validate().unwrap();
+    // Points found square by square are those found block by block.
+    let squares_of = super::squares::Squares::new(&map, &grid.quads).unwrap();
+    let mut found = vec![false; grid.points.len()];
+    for f in c.faces() {
+        for (h, v) in c.face_halfedges(f).into_iter().zip(c.face_vertices(f)) {
+            let place = map.sheet.at(h);
+            if place.map(f64::round) != place {
+                continue;
+            }
+            let at = place.map(|x| x as i64);
+            let seen = squares_of.at(f, place);
+            let corner = seen.corner_at(at).unwrap();
+            let point = grid.quads.quads[seen.square as usize][usize::from(corner)] as usize;
+            found[point] = true;
+            let apart =
+                crate::geometry::mesh::distance(grid.points[point], map.sheet.fine.position[v]);
+            assert!(apart < 1e-9, "{apart}");
+        }
+    }
+    assert!(found.contains(&true));
     for h in c.halfedges() {
         let Some(t) = c.twin(h) else { continue };
         let shift = map.shift(h).map(|x| x as f64);

@@ -96,7 +96,7 @@ fn each(
         .zip(otherwise)
         .zip(shares);
     for (index, (((component, requests), otherwise), share)) in parts.enumerate() {
-        let config = &shares::of_share(config, share);
+        let config = &shares::of_share(config, share)?;
         let stages = Observed {
             observer,
             component: index,

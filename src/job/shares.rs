@@ -6,6 +6,7 @@
 use crate::config::Config;
 use crate::export::pictures::SIDE_RANGE;
 use crate::geometry::mesh::triangle_area;
+use crate::grid::{GridError, MOST_CELLS};
 use crate::repair::Component;
 
 /// A component with at least this part of the area gets all texels and the pictures that the configuration asks for, a smaller one
@@ -60,7 +61,13 @@ pub(super) fn shares(components: &[Component]) -> Vec<Share> {
 }
 
 /// The configuration of a component with this share.
-pub(super) fn of_share(config: &Config, Share { part: share, area }: Share) -> Config {
+///
+/// # Errors
+/// A size of cells that asks for too many.
+pub(super) fn of_share(
+    config: &Config,
+    Share { part: share, area }: Share,
+) -> Result<Config, GridError> {
     let mut config = config.clone();
     let at_least = |whole: usize, part: f64, least: usize| {
         (whole as f64 * part).round().max(least.min(whole) as f64) as usize
@@ -68,13 +75,24 @@ pub(super) fn of_share(config: &Config, Share { part: share, area }: Share) -> C
     config.patches.texel_budget =
         at_least(config.patches.texel_budget, share, LEAST_TEXELS).min(config.patches.texel_budget);
     config.grid.cells = match config.grid.cell_size {
-        // Too many are refused by the grid itself, with their number.
-        Some(size) => (area / (size * size)).round().max(1.0) as usize,
+        Some(size) => {
+            let cells = area / (size * size);
+            if cells > MOST_CELLS as f64 {
+                return Err(GridError::CellSize {
+                    size,
+                    area,
+                    cells,
+                    most: MOST_CELLS,
+                    least: (area / MOST_CELLS as f64).sqrt(),
+                });
+            }
+            cells.round().max(1.0) as usize
+        }
         None => at_least(config.grid.cells, share, LEAST_CELLS),
     };
     config.pictures.size =
         at_least(config.pictures.size, share, LEAST_SIDE).min(config.pictures.size);
-    config
+    Ok(config)
 }
 
 #[cfg(test)]
@@ -88,7 +106,7 @@ mod tests {
         config.pictures.size = 1000;
         let share = |part| Share { part, area: 1.0 };
         let of = |part: f64| {
-            let config = of_share(&config, share(part));
+            let config = of_share(&config, share(part)).unwrap();
             (config.patches.texel_budget, config.pictures.size)
         };
         assert_eq!(of(1.0), (100_000, 1000));
@@ -96,7 +114,7 @@ mod tests {
         assert_eq!(of(0.0), (LEAST_TEXELS, LEAST_SIDE));
         config.patches.texel_budget = 1000;
         config.pictures.size = 64;
-        let small = of_share(&config, share(0.01));
+        let small = of_share(&config, share(0.01)).unwrap();
         assert_eq!(
             (small.patches.texel_budget, small.pictures.size),
             (1000, 64)
@@ -110,6 +128,10 @@ mod tests {
                 ..share(0.01)
             },
         );
-        assert_eq!(sized.grid.cells, 500);
+        assert_eq!(sized.unwrap().grid.cells, 500);
+        config.grid.cell_size = Some(1e-4);
+        let refused = of_share(&config, share(1.0)).unwrap_err().to_string();
+        let says = "grid.cell_size = 0.0001 asks for 1.000e8 cells on an area of 1.000e0 square units, and a grid has at most 1000000: at least 1.000e-3 is possible";
+        assert_eq!(refused, says);
     }
 }
