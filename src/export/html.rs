@@ -65,24 +65,10 @@ pub(super) fn figure(x: f64) -> String {
     }
 }
 
-/// Where the pictures of a page come from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Pictures {
-    /// From the page itself.
-    Inside,
-    /// From files below the page's folder too.
-    Beside,
-}
-
-impl Pictures {
-    /// As the policy has it. A page that is opened from disk has no origin of its own that all browsers agree on, hence `file:`.
-    fn sources(self) -> &'static str {
-        match self {
-            Self::Inside => "data:",
-            Self::Beside => "data: 'self' file:",
-        }
-    }
-}
+/// Where the pictures of a page come from, as its policy has it: from the page itself, …
+pub(super) const INSIDE: &str = "data:";
+/// … and from files below its folder too. A page that is opened from disk has no origin of its own that all browsers agree on, hence `file:`.
+pub(super) const BESIDE: &str = "data: 'self' file:";
 
 /// A page: `body` is markup already, `title` is text.
 pub(super) fn page(
@@ -90,16 +76,15 @@ pub(super) fn page(
     style: &str,
     body: &str,
     scripts: &[&str],
-    pictures: Pictures,
+    pictures: &str,
 ) -> String {
     let mut out = String::with_capacity(body.len() + 64 * 1024);
     out.push_str("<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
     let _ = write!(
         out,
         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src {}\">\n\
-         <link rel=\"icon\" href=\"data:,\">\n",
-        pictures.sources()
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src {pictures}\">\n\
+         <link rel=\"icon\" href=\"data:,\">\n"
     );
     let _ = write!(
         out,
@@ -132,7 +117,7 @@ mod tests {
             link("a b/javascript:x%\"<.html"),
             "./a%20b/javascript%3Ax%25%22%3C.html"
         );
-        assert!(page(hostile, "", "", &[], Pictures::Inside).contains("<title>&lt;/script&gt;"));
+        assert!(page(hostile, "", "", &[], INSIDE).contains("<title>&lt;/script&gt;"));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::atlas::patches::Domain;
 use crate::atlas::{axes, charts, develop, geometry_image, patches};
 use crate::config::Config;
 use crate::flow::cones::Requests;
-use crate::geometry::deviation::{Triangles, distances};
+use crate::geometry::deviation::Triangles;
 use crate::grid;
 use crate::observe::Observer;
 use crate::product::AffineAtlas;
@@ -121,22 +121,19 @@ pub(super) fn pipeline(
         faces: &given_faces,
     };
     let readable = Images::new(&patches, &images, origin);
-    let (quality, rebuilt) = report::measure_images(
+    let (quality, distances) = report::measure_images(
         quality,
         given,
         &readable,
         topology,
         config.patches.texel_budget,
+        // What only the page shows.
+        match config.report.enabled {
+            true => mesh.positions.as_slice(),
+            false => &[],
+        },
     );
-    let image_distance = rebuilt
-        .filter(|_| config.report.enabled)
-        .and_then(|rebuilt| {
-            let rebuilt = Triangles {
-                positions: &rebuilt.positions,
-                faces: &rebuilt.faces,
-            };
-            distances(mesh.positions.as_slice(), rebuilt)
-        });
+    let image_distance = distances.filter(|_| config.report.enabled);
     let atlas = AffineAtlas {
         topology,
         seamless: report::is_seamless(&charts),

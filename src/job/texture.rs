@@ -300,7 +300,7 @@ impl TexturedComponent {
     fn picture(&self) -> image::RgbImage {
         let size = self.painted.size as f64;
         let packed = self.packed();
-        let colour = |face: usize, weights: [f64; 3], _: f64| {
+        let colour = |face: usize, weights: [f64; 3]| {
             let corners = packed[face];
             let [u, v]: [f64; 2] =
                 std::array::from_fn(|i| (0..3).map(|k| weights[k] * corners[k][i]).sum());

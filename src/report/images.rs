@@ -1,32 +1,32 @@
 //! How well the images hold the surface: the mesh rebuilt from them, against the surface that came in.
 
 use crate::geometry::connectivity::Topology;
-use crate::geometry::deviation::{Sampling, Triangles, deviation};
+use crate::geometry::deviation::{Sampling, Triangles, deviation_and_distances};
 use crate::geometry::mesh::{bounding_box, distance};
 use crate::product::{MeanMax, Quality};
-use crate::rebuild::{Images, Rebuilt, rebuild};
+use crate::rebuild::{Images, rebuild};
 
-/// Samples on each side. The RMS of so many is off by a few per cent at most (0.2 dB); more would cost more than they tell.
-const SAMPLING: Sampling = Sampling {
-    samples: 20_000,
-    vertices: 20_000,
-};
+/// Samples on each side for each face of the source, and the range that they are held to. The RMS of the most is off by a few per cent at
+/// most (0.2 dB); more would cost more than they tell.
+const SAMPLES_OF_FACE: usize = 4;
+const SAMPLES: [usize; 2] = [4_000, 20_000];
 
 /// Images of so many texels are measured whatever was asked for, …
 const MEASURED_TEXELS: usize = 4_500_000;
 /// … and so many times what was asked for: tens of thousands of patches have images of many more texels, and the mesh rebuilt from these fills the memory.
 const MEASURED_BUDGETS: usize = 2;
 
-/// Fills in what is measured on images, and gives the mesh rebuilt from them; `source` is the surface after repair. Nothing where
-/// the images do not make a mesh of the surface's topology, or have far more texels than the `budget` that was asked for, which is said as a warning: charts and transitions
-/// are as good as they are.
+/// Fills in what is measured on images, and gives the distances of `points` from the mesh rebuilt from them; `source` is the surface after
+/// repair. Nothing where the images do not make a mesh of the surface's topology, or have far more texels than the `budget` that was asked for,
+/// which is said as a warning: charts and transitions are as good as they are.
 pub fn measure_images(
     quality: Quality,
     source: Triangles<'_>,
     images: &Images<'_>,
     topology: Topology,
     budget: usize,
-) -> (Quality, Option<Rebuilt>) {
+    points: &[[f64; 3]],
+) -> (Quality, Option<Vec<f64>>) {
     let (texels, most) = (
         images.texels(),
         MEASURED_TEXELS.max(MEASURED_BUDGETS * budget),
@@ -40,13 +40,8 @@ pub fn measure_images(
         return (quality, None);
     }
     let rebuilt = rebuild(images).and_then(|mesh| {
-        let Topology {
-            euler_characteristic,
-            genus,
-            boundary_loops,
-            ..
-        } = topology;
-        mesh.expect_topology(euler_characteristic, genus, boundary_loops as i64)?;
+        let loops = topology.boundary_loops as i64;
+        mesh.expect_topology(topology.euler_characteristic, topology.genus, loops)?;
         Ok(mesh)
     });
     let mesh = match rebuilt {
@@ -60,8 +55,14 @@ pub fn measure_images(
         positions: &mesh.positions,
         faces: &mesh.faces,
     };
-    let Some(found) = deviation(source, rebuilt, SAMPLING) else {
-        return (quality, Some(mesh));
+    let samples = (SAMPLES_OF_FACE * source.faces.len()).clamp(SAMPLES[0], SAMPLES[1]);
+    let sampling = Sampling {
+        samples,
+        vertices: samples,
+    };
+    let found = deviation_and_distances(source, rebuilt, sampling, points);
+    let Some((found, distances)) = found else {
+        return (quality, None);
     };
     let (low, high) = bounding_box(source.positions);
     let quality = Quality {
@@ -73,5 +74,5 @@ pub fn measure_images(
         }),
         ..quality
     };
-    (quality, Some(mesh))
+    (quality, Some(distances))
 }

@@ -2,7 +2,7 @@
 
 use super::assets::Asset;
 use super::changes::{Change, Changes, WORSE_BY, WORSE_FACTOR};
-use crate::export::html::{self, Pictures, escape, link};
+use crate::export::html::{self, escape, link};
 use crate::export::manifest::State;
 use crate::export::names::{self, component_name};
 use std::fmt::Write as _;
@@ -52,7 +52,7 @@ pub(super) fn page(assets: &[Asset<'_>], changes: &Changes) -> String {
         STYLE,
         &body,
         &[html::TABLES, SCRIPT],
-        Pictures::Beside,
+        html::BESIDE,
     )
 }
 

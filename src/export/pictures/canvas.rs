@@ -1,10 +1,15 @@
-//! A supersampled sheet of paper: triangles, lines and discs in the plane.
+//! A sheet of paper: antialiased triangles, lines and discs in the plane.
 
-use super::raster::covered;
-use image::{Rgb, RgbImage};
+use super::raster::{SAMPLES, covered, stroked};
+use image::RgbImage;
 
-/// Samples along each side of a pixel.
-const SAMPLES: usize = 3;
+/// Sides that pictures are held to, pixels: smaller ones show nothing, larger ones are a mistake.
+pub const SIDE_RANGE: [usize; 2] = [64, 8192];
+
+/// The size asked for, held to [`SIDE_RANGE`].
+pub(super) fn side(size: usize) -> usize {
+    size.clamp(SIDE_RANGE[0], SIDE_RANGE[1])
+}
 
 /// The sheet. Coordinates are pixels, the origin at the top left, rows downwards.
 pub struct Canvas {
@@ -19,77 +24,26 @@ impl Canvas {
         Canvas {
             width,
             height,
-            samples: vec![paper; width * height * SAMPLES * SAMPLES],
+            samples: vec![paper; width * height * SAMPLES],
         }
-    }
-
-    fn end(&self) -> [usize; 2] {
-        [self.width * SAMPLES, self.height * SAMPLES]
     }
 
     /// A triangle, whichever way it is turned; `colour` is told what lies beneath.
     pub fn triangle(&mut self, points: [[f64; 2]; 3], colour: impl Fn([u8; 3]) -> [u8; 3]) {
-        let scaled = points.map(|p| [p[0] * SAMPLES as f64, p[1] * SAMPLES as f64, 0.0]);
-        let end = self.end();
-        covered(&scaled, end, 0, |column, row, _| {
-            let sample = &mut self.samples[row * end[0] + column];
-            *sample = colour(*sample);
+        let width = self.width;
+        covered(points, width, 0..self.height * SAMPLES, |row, columns| {
+            for sample in &mut self.samples[row * width..][columns] {
+                *sample = colour(*sample);
+            }
         });
     }
 
-    /// A line with round ends, `width` pixels thick.
-    pub fn line(&mut self, a: [f64; 2], b: [f64; 2], width: f64, colour: [u8; 3]) {
-        let scale = SAMPLES as f64;
-        let (a, b) = (a.map(|x| x * scale), b.map(|x| x * scale));
-        let radius = 0.5 * width * scale;
-        if a.iter().chain(&b).any(|x| !x.is_finite()) {
-            return;
-        }
-        let axis = [b[0] - a[0], b[1] - a[1]];
-        let length2 = axis[0] * axis[0] + axis[1] * axis[1];
-        let end = self.end();
-        let range = |k: usize| {
-            let low = (a[k].min(b[k]) - radius).floor().max(0.0) as usize;
-            let high = (a[k].max(b[k]) + radius).ceil().clamp(0.0, end[k] as f64);
-            low..high as usize
-        };
-        let columns = range(0);
-        let half = radius * length2.sqrt() / axis[1].abs();
-        for row in range(1) {
-            // Where the row comes as near as that to the whole line, and a sample more; casts saturate.
-            let middle = a[0] + axis[0] * (row as f64 + 0.5 - a[1]) / axis[1] - 0.5;
-            let (from, to) = match (middle - half, middle + half) {
-                (from, to) if from.is_finite() && to.is_finite() => {
-                    ((from - 1.0) as usize, (to + 2.0) as usize)
-                }
-                _ => (columns.start, columns.end),
-            };
-            for column in columns.start.max(from)..columns.end.min(to) {
-                let d = [column as f64 + 0.5 - a[0], row as f64 + 0.5 - a[1]];
-                let along = d[0] * axis[0] + d[1] * axis[1];
-                let t = if length2 > 0.0 {
-                    (along / length2).clamp(0.0, 1.0)
-                } else {
-                    0.0
-                };
-                let away = [d[0] - t * axis[0], d[1] - t * axis[1]];
-                if away[0] * away[0] + away[1] * away[1] <= radius * radius {
-                    self.samples[row * end[0] + column] = colour;
-                }
-            }
-        }
-    }
-
-    /// A dashed line.
-    pub fn dashes(&mut self, a: [f64; 2], b: [f64; 2], width: f64, colour: [u8; 3]) {
-        let length = (b[0] - a[0]).hypot(b[1] - a[1]);
-        let pieces = (length / (8.0 * width)).clamp(1.0, 4096.0) as usize;
-        let at = |t: f64| [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])];
-        for k in 0..pieces {
-            let from = k as f64 / pieces as f64;
-            let to = (k as f64 + 0.5) / pieces as f64;
-            self.line(at(from), at(to), width, colour);
-        }
+    /// A line with round ends, `thickness` pixels thick.
+    pub fn line(&mut self, a: [f64; 2], b: [f64; 2], thickness: f64, colour: [u8; 3]) {
+        let (width, rows) = (self.width, 0..self.height * SAMPLES);
+        stroked([a, b], 0.5 * thickness, width, rows, |column, row, _, _| {
+            self.samples[row * width + column] = colour;
+        });
     }
 
     /// A disc with a rim.
@@ -100,20 +54,19 @@ impl Canvas {
 
     /// The picture, samples averaged.
     pub fn finish(self) -> RgbImage {
-        let columns = self.width * SAMPLES;
-        RgbImage::from_fn(self.width as u32, self.height as u32, |x, y| {
-            let mut sum = [0_u32; 3];
-            for row in 0..SAMPLES {
-                let from = (y as usize * SAMPLES + row) * columns + x as usize * SAMPLES;
-                for sample in &self.samples[from..from + SAMPLES] {
-                    for (s, &c) in sum.iter_mut().zip(sample) {
-                        *s += u32::from(c);
-                    }
+        let mut image = RgbImage::new(self.width as u32, self.height as u32);
+        let lines = image.chunks_exact_mut(3 * self.width);
+        for (line, samples) in lines.zip(self.samples.chunks_exact(SAMPLES * self.width)) {
+            for (x, pixel) in line.chunks_exact_mut(3).enumerate() {
+                let of_pixel: [[u8; 3]; SAMPLES] =
+                    std::array::from_fn(|k| samples[k * self.width + x]);
+                for (i, byte) in pixel.iter_mut().enumerate() {
+                    let sum: u32 = of_pixel.iter().map(|sample| u32::from(sample[i])).sum();
+                    *byte = ((sum + SAMPLES as u32 / 2) / SAMPLES as u32) as u8;
                 }
             }
-            let count = (SAMPLES * SAMPLES) as u32;
-            Rgb(sum.map(|s| ((s + count / 2) / count) as u8))
-        })
+        }
+        image
     }
 }
 
@@ -141,7 +94,7 @@ mod tests {
         let mut canvas = Canvas::new(20, 20, [9; 3]);
         canvas.line([-1e12, -50.0], [1e12, -40.0], 3.0, [255; 3]);
         canvas.line([f64::NAN, 0.0], [5.0, 5.0], 3.0, [255; 3]);
-        canvas.dashes([100.0, 100.0], [1e9, 100.0], 1.0, [255; 3]);
+        canvas.line([100.0, 100.0], [1e9, 100.0], 1.0, [255; 3]);
         canvas.triangle([[30.0, 30.0], [50.0, 30.0], [30.0, 50.0]], |_| [255; 3]);
         assert!(canvas.finish().pixels().all(|p| p.0 == [9; 3]));
     }

@@ -1,9 +1,11 @@
 //! A checkerboard in flat coordinates that stays readable whatever the scale. On a grid it is that of `TEXCOORD_0`, whose squares are cells.
 
 use super::colour::{Linear, mix};
+use super::studio::Spot;
 use crate::atlas::plane::{doubled_area, rotate};
 use crate::geometry::ids::FaceId;
 use crate::geometry::mesh::triangle_area;
+use crate::geometry::triangle::area;
 use crate::product::AffineAtlas;
 
 /// Cells of the checkerboard along the diagonal of the surface, at its middle scale.
@@ -18,8 +20,6 @@ pub struct Checkerboard<'a> {
     cell: f64,
     /// log₂ of a cell's side in space at each vertex, relative to the middle.
     level: Vec<f64>,
-    /// Middle side of a cell in space.
-    side: f64,
 }
 
 impl Checkerboard<'_> {
@@ -30,26 +30,25 @@ impl Checkerboard<'_> {
         let mut scales: Vec<(f64, f64)> = Vec::new();
         let mut sums = vec![[0.0; 2]; mesh.positions.len()];
         for f in mesh.connectivity.faces() {
-            let area = triangle_area(mesh.face_positions(f));
+            let source = triangle_area(mesh.face_positions(f));
             let flat = match &atlas.grid {
                 Some(grid) => 0.5 * doubled_area(grid.uv[f]),
                 // From the flat lengths: tiny faces have no reliable area in the chart's coordinates.
-                None => heron(
-                    mesh.connectivity
-                        .face_edges(f)
-                        .map(|e| atlas.metric.length[e]),
-                ),
+                None => {
+                    let sides = mesh.connectivity.face_edges(f);
+                    area(sides.map(|e| atlas.metric.length[e])).unwrap_or(f64::NAN)
+                }
             };
-            let scale = 0.5 * (flat / area).log2();
-            if scale.is_finite() && area.is_finite() {
-                scales.push((scale, area));
+            let scale = 0.5 * (flat / source).log2();
+            if scale.is_finite() && source.is_finite() {
+                scales.push((scale, source));
                 for v in mesh.connectivity.face_vertices(f) {
                     let sum = &mut sums[v.index()];
-                    *sum = [sum[0] + area * scale, sum[1] + area];
+                    *sum = [sum[0] + source * scale, sum[1] + source];
                 }
             }
         }
-        scales.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let scales = ascending(scales.into_iter());
         let (middle, side) = match &atlas.grid {
             Some(grid) => (-grid.cell_size.log2(), grid.cell_size),
             None => {
@@ -57,36 +56,40 @@ impl Checkerboard<'_> {
                 (weighted_quantile(&scales, 0.5), side)
             }
         };
-        let level = sums
-            .into_iter()
-            .map(|[sum, area]| if area > 0.0 { middle - sum / area } else { 0.0 });
+        let level = |[sum, area]: [f64; 2]| if area > 0.0 { middle - sum / area } else { 0.0 };
         Checkerboard {
-            level: level.collect(),
+            level: sums.into_iter().map(level).collect(),
             cell: side * middle.exp2(),
-            side,
             atlas,
         }
     }
 
-    /// Colour of a point of a face by its barycentric weights, where a pixel has the size `footprint` in source units.
-    pub fn colour(&self, face: usize, weights: [f64; 3], footprint: f64) -> Linear {
+    /// Colour of a spot of the surface, averaged over about a pixel.
+    pub fn colour(&self, spot: &Spot) -> Linear {
         const LIGHT: Linear = [0.84, 0.80, 0.71];
         const DARK: Linear = [0.070, 0.205, 0.270];
-        let f = FaceId::new(face);
+        let f = FaceId::new(spot.face);
         let corners = self.atlas.mesh.connectivity.face_vertices(f);
-        let level: f64 = (0..3)
-            .map(|k| weights[k] * self.level[corners[k].index()])
-            .sum();
-        let excess = excess(level);
+        let level = |k: usize| spot.weights[k] * self.level[corners[k].index()];
+        let excess = excess(level(0) + level(1) + level(2));
         let step = excess.floor();
         let fade = (((excess - step) - 0.47) / 0.06).clamp(0.0, 1.0);
-        let cell = self.cell * (-step).exp2();
-        let at = self.place(f, weights, cell);
-        let dark = (1.0 - fade) * is_dark(at, cell) + fade * is_dark(at, 0.5 * cell);
-        // Where cells get as small as pixels, only their mean is left.
-        let pixels = self.side * (level - step).exp2() / footprint;
-        let contrast = ((pixels - 1.5) / 2.0).clamp(0.0, 1.0);
-        mix(LIGHT, DARK, (0.5 + (dark - 0.5) * contrast) as f32)
+        let cell = self.cell(step);
+        let corners = self.corners(f, cell);
+        let [from_1, from_2] = [1, 2].map(|k| [0, 1].map(|i| corners[k][i] - corners[0][i]));
+        let along = |w: &[f64; 3], i: usize| w[1] * from_1[i] + w[2] * from_2[i];
+        let at = [0, 1].map(|i| corners[0][i] + along(&spot.weights, i));
+        // Not beyond the face: cells need not alternate where an island ends.
+        let spans = [0, 1].map(|i| {
+            let half = 0.5 * (along(&spot.right, i).abs() + along(&spot.down, i).abs());
+            let [a, b, c] = corners.map(|p| p[i]);
+            [
+                (at[i] - half).max(a.min(b).min(c)),
+                (at[i] + half).min(a.max(b).max(c)),
+            ]
+        });
+        let [coarse, fine] = [cell, 0.5 * cell].map(|cell| dark_share(spans, cell));
+        mix(LIGHT, DARK, (coarse + fade * (fine - coarse)) as f32)
     }
 
     /// log₂ of a cell's side in space at each vertex, relative to the middle.
@@ -99,45 +102,40 @@ impl Checkerboard<'_> {
         self.cell * (-step).exp2()
     }
 
-    /// [`Checkerboard::place`] of the corners of a face.
-    pub fn corners(&self, f: FaceId, cell: f64) -> [[f64; 2]; 3] {
-        const CORNERS: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        CORNERS.map(|weights| self.place(f, weights, cell))
-    }
-
-    /// Central-chart coordinates of a point of a face, up to an even number of cells; on a grid, coordinates in its island.
+    /// Central-chart coordinates of the corners of a face, up to an even number of cells; on a grid, coordinates in its island.
     ///
     /// They are taken through the patch, which keeps full precision where the chart's own coordinates, far from its
     /// origin, could not tell the cells of a tiny face apart.
-    fn place(&self, f: FaceId, weights: [f64; 3], cell: f64) -> [f64; 2] {
+    pub fn corners(&self, f: FaceId, cell: f64) -> [[f64; 2]; 3] {
         let layout = &self.atlas.patches;
+        let patch = layout.face_patch[f].index();
         if let Some(grid) = &self.atlas.grid {
-            let (_, offset) = grid.islands.place[layout.face_patch[f].index()];
-            let uv = &layout.uv[f];
-            return std::array::from_fn(|i| {
-                let at = (0..3).map(|k| weights[k] * uv[k][i]);
-                at.sum::<f64>() + offset[i] as f64
-            });
+            let (_, offset) = grid.islands.place[patch];
+            return layout.uv[f].map(|p| [0, 1].map(|i| p[i] + offset[i] as f64));
         }
-        let patch = layout.patches.get(layout.face_patch[f].index());
-        let motion = patch.and_then(|patch| patch.to_chart);
-        let uv = match motion {
-            Some(_) => &layout.uv[f],
-            None => &self.atlas.central.uv[f],
-        };
-        let at: [f64; 2] = std::array::from_fn(|i| {
-            let d = |k: usize| uv[k][i] - uv[0][i];
-            uv[0][i] + weights[1] * d(1) + weights[2] * d(2)
-        });
-        let Some(motion) = motion else { return at };
-        let turned = rotate(at, motion.rotation);
-        std::array::from_fn(|i| motion.scale * turned[i] + motion.translation[i] % (2.0 * cell))
+        match layout.patches.get(patch).and_then(|patch| patch.to_chart) {
+            Some(motion) => layout.uv[f].map(|p| {
+                let turned = rotate(p, motion.rotation);
+                let shift = motion.translation.map(|x| x % (2.0 * cell));
+                [0, 1].map(|i| motion.scale * turned[i] + shift[i])
+            }),
+            None => self.atlas.central.uv[f],
+        }
     }
 }
 
 /// By how many powers of two cells at this level are too large (positive) or too small: those are cut, these joined.
 pub fn excess(level: f64) -> f64 {
     level - level.clamp(CELL_RANGE[0], CELL_RANGE[1])
+}
+
+/// Values with their weights in ascending order, without what is not finite.
+pub fn ascending(values: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
+    let mut sorted: Vec<_> = values
+        .filter(|v| v.0.is_finite() && v.1.is_finite())
+        .collect();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    sorted
 }
 
 /// The value below which the given share of the weight lies, of values in ascending order with their weights; 0 where
@@ -152,18 +150,16 @@ pub fn weighted_quantile(values: &[(f64, f64)], share: f64) -> f64 {
     found.or(values.last()).map_or(0.0, |v| v.0)
 }
 
-/// Area of a triangle by its sides (Kahan's arrangement of Heron's formula); NaN where there is no such triangle.
-fn heron(mut sides: [f64; 3]) -> f64 {
-    sides.sort_by(|x, y| y.total_cmp(x));
-    let [a, b, c] = sides;
-    0.25 * ((a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c))).sqrt()
-}
-
-/// 1 on the dark cells of a checkerboard, 0 on the others and where there is no board.
-fn is_dark(at: [f64; 2], cell: f64) -> f64 {
-    let sum = (at[0] / cell).floor() + (at[1] / cell).floor();
-    let rest = sum.rem_euclid(2.0);
-    if rest >= 1.0 { 1.0 } else { 0.0 }
+/// Share of dark cells between these ends along both axes; half where there is no board.
+fn dark_share(spans: [[f64; 2]; 2], cell: f64) -> f64 {
+    // Along each axis the mean of a wave of −1 and 1, from its integral; their product is the board.
+    let [x, y] = spans.map(|[low, high]| {
+        let (low, width) = (low / cell, ((high - low) / cell).max(1e-6));
+        let integral = |x: f64| (0.5 * x - (0.5 * x).floor() - 0.5).abs();
+        2.0 * (integral(low) - integral(low + width)) / width
+    });
+    let dark = 0.5 - 0.5 * x * y;
+    if dark.is_finite() { dark } else { 0.5 }
 }
 
 #[cfg(test)]
@@ -182,11 +178,13 @@ mod tests {
     }
 
     #[test]
-    fn area_of_a_needle_by_its_sides() {
-        assert!((heron([3.0, 5.0, 4.0]) - 6.0).abs() < 1e-14);
-        // Height 1e-3 over a base of 2.
-        let side = 1.0_f64.hypot(1e-3);
-        assert!((heron([side, 2.0, side]) / 1e-3 - 1.0).abs() < 1e-9);
-        assert!(heron([1.0, 1.0, 3.0]).is_nan());
+    fn the_mean_of_many_cells_is_between_both_colours() {
+        let at =
+            |x: f64, width: f64| dark_share([[x - 0.5 * width, x + 0.5 * width], [0.4, 0.6]], 1.0);
+        assert!(at(0.5, 0.1) < 1e-12 && at(1.5, 0.1) > 1.0 - 1e-12);
+        // A box of half a cell that reaches into the next by a quarter.
+        assert!((at(1.0, 0.5) - 0.5).abs() < 1e-12);
+        assert!((at(0.3, 40.0) - 0.5).abs() < 0.05);
+        assert_eq!(at(f64::NAN, 1.0), 0.5);
     }
 }

@@ -1,5 +1,7 @@
 //! Colours: linear light for shading, sRGB bytes for files.
 
+use std::sync::LazyLock;
+
 /// Red, green, blue in linear light, 0 to 1.
 pub type Linear = [f32; 3];
 
@@ -18,26 +20,38 @@ pub const NEGATIVE: [u8; 3] = [38, 98, 204];
 
 /// sRGB byte to linear light.
 pub fn to_linear(colour: [u8; 3]) -> Linear {
-    colour.map(|c| {
-        let c = f32::from(c) / 255.0;
-        if c <= 0.04045 {
-            c / 12.92
-        } else {
-            ((c + 0.055) / 1.055).powf(2.4)
-        }
-    })
+    static LIGHT: LazyLock<[f32; 256]> = LazyLock::new(|| {
+        std::array::from_fn(|c| {
+            let c = c as f32 / 255.0;
+            if c <= 0.04045 {
+                c / 12.92
+            } else {
+                ((c + 0.055) / 1.055).powf(2.4)
+            }
+        })
+    });
+    let light: &[f32; 256] = &LIGHT;
+    colour.map(|c| light[usize::from(c)])
 }
 
 /// Linear light to sRGB bytes; anything outside 0 to 1 is clamped, NaN is black.
 pub fn to_bytes(colour: Linear) -> [u8; 3] {
-    colour.map(|c| {
-        let c = if c <= 0.003_130_8 {
-            12.92 * c
-        } else {
-            1.055 * c.powf(1.0 / 2.4) - 0.055
+    // Finer than bytes are at their densest.
+    const STEPS: f32 = 16383.0;
+    static BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| {
+        let byte = |k: u16| {
+            let c = f32::from(k) / STEPS;
+            let c = if c <= 0.003_130_8 {
+                12.92 * c
+            } else {
+                1.055 * c.powf(1.0 / 2.4) - 0.055
+            };
+            (255.0 * c + 0.5) as u8
         };
-        (255.0 * c + 0.5).clamp(0.0, 255.0) as u8
-    })
+        (0..=STEPS as u16).map(byte).collect()
+    });
+    let bytes: &[u8] = &BYTES;
+    colour.map(|c| bytes[(c * STEPS + 0.5).clamp(0.0, STEPS) as usize])
 }
 
 /// a + t (b − a), component by component.
@@ -45,25 +59,14 @@ pub fn mix(a: Linear, b: Linear, t: f32) -> Linear {
     std::array::from_fn(|i| a[i] + t * (b[i] - a[i]))
 }
 
-/// Well distinguishable colours for any number of things: hues a golden angle apart, two lightnesses.
+/// Well distinguishable pale colours for any number of things: hues a golden angle apart, three lightnesses.
 pub fn categorical(index: usize) -> [u8; 3] {
     let turn = (index as f32 * 0.618_034 + 0.58).fract();
-    let lightness = [0.83, 0.76, 0.88][index % 3];
-    oklch(lightness, 0.085, std::f32::consts::TAU * turn)
-}
-
-/// OKLCH (Ottosson 2020, "A perceptual color space for image processing") to sRGB bytes.
-fn oklch(lightness: f32, chroma: f32, hue: f32) -> [u8; 3] {
-    let (a, b) = (chroma * hue.cos(), chroma * hue.sin());
-    let l = lightness + 0.396_337_78 * a + 0.215_803_76 * b;
-    let m = lightness - 0.105_561_346 * a - 0.063_854_17 * b;
-    let s = lightness - 0.089_484_18 * a - 1.291_485_5 * b;
-    let [l, m, s] = [l * l * l, m * m * m, s * s * s];
-    to_bytes([
-        4.076_741_7 * l - 3.307_711_6 * m + 0.230_969_94 * s,
-        -1.268_438 * l + 2.609_757_4 * m - 0.341_319_4 * s,
-        -0.004_196_086_3 * l - 0.703_418_6 * m + 1.707_614_7 * s,
-    ])
+    let lightness = [0.79, 0.73, 0.85][index % 3];
+    std::array::from_fn(|i| {
+        let phase = std::f32::consts::TAU * (turn - i as f32 / 3.0);
+        (255.0 * (lightness + 0.15 * phase.cos())) as u8
+    })
 }
 
 /// A diverging scale: blue at −1, pale at 0, red at 1; values beyond are held at the ends.
@@ -77,13 +80,12 @@ pub fn diverging(x: f64) -> [u8; 3] {
         [214.0, 96.0, 76.0],
         [140.0, 20.0, 44.0],
     ];
-    let last = STOPS.len() - 1;
     let at = if x.is_nan() {
-        0.5
+        3.0
     } else {
-        (x.clamp(-1.0, 1.0) + 1.0) / 2.0
-    } * last as f64;
-    let low = (at as usize).min(last - 1);
+        3.0 + 3.0 * x.clamp(-1.0, 1.0)
+    };
+    let low = (at as usize).min(STOPS.len() - 2);
     let t = at - low as f64;
     std::array::from_fn(|i| (STOPS[low][i] + t * (STOPS[low + 1][i] - STOPS[low][i]) + 0.5) as u8)
 }

@@ -1,12 +1,10 @@
 //! Several metrics on one surface, side by side from the same views in the same colours.
 
 use super::colour::{INK, PAPER};
-use super::paint::Paint;
-use super::scale::{Range, Scale};
-use super::scene::Marks;
-use super::studio::{Studio, direction};
-use super::surface::{CONE_RADIUS, CUT_RADIUS};
-use super::text::{self, Anchor, LINE};
+use super::scale::Range;
+use super::studio::{Mark, Spot, Studio};
+use super::text::{self, LINE};
+use super::view::choose_direction;
 use crate::geometry::mesh::Mesh;
 use image::{Rgb, RgbImage, imageops};
 use std::f64::consts::FRAC_PI_2;
@@ -16,8 +14,6 @@ const CONE_SIZES: [f64; 2] = [0.45, 2.2];
 /// Pixels of the strip with the bar of colours, and panels from which on there is one.
 const STRIP: usize = 132;
 const LEAST_BARRED: usize = 320;
-/// Height of a unit vector that points steeply up or down.
-const STEEP: f64 = 0.9;
 /// Pixels above and below the titles.
 const MARGIN: usize = 8;
 
@@ -36,7 +32,7 @@ pub struct Panel<'a> {
 /// A surface whose views and light stand ready.
 pub struct Gallery<'a> {
     /// From the front and, where the surface is closed, from behind.
-    studios: Vec<Studio<'a>>,
+    studios: Vec<Studio>,
     mesh: &'a Mesh,
     side: usize,
 }
@@ -44,17 +40,17 @@ pub struct Gallery<'a> {
 impl<'a> Gallery<'a> {
     /// Sets up panels of `size` × `size` pixels, held to the range of sizes.
     pub fn new(mesh: &'a Mesh, size: usize) -> Gallery<'a> {
-        let front = direction(mesh);
-        let studio = |from| Studio::seen_from(mesh, size, from);
+        let (positions, faces) = (mesh.positions.as_slice(), mesh.connectivity.to_faces());
+        let front = choose_direction(positions, &faces);
+        let studio = |from| Studio::new(mesh, size, from);
         let mut studios = vec![studio(front)];
         if mesh.connectivity.is_closed() {
-            // Half around the vertical; from above also from below.
+            // Half around the vertical.
             let [x, y, z] = front;
-            let above = y.abs() > STEEP;
-            studios.push(studio([-x, if above { -y } else { y }, -z]));
+            studios.push(studio([-x, y, -z]));
         }
         Gallery {
-            side: super::size::side(size),
+            side: super::canvas::side(size),
             studios,
             mesh,
         }
@@ -67,16 +63,6 @@ impl<'a> Gallery<'a> {
     /// geometric mean, so that the one need not be all pale nor the other all dark. Cones are red or blue by their
     /// sign, larger for more curvature.
     pub fn row(&self, panels: &[Panel<'_>]) -> RgbImage {
-        self.shrunk(panels, 1)
-    }
-
-    /// The same in panels of half the size, for many of them.
-    pub fn overview(&self, panels: &[Panel<'_>]) -> RgbImage {
-        self.shrunk(panels, 2)
-    }
-
-    /// Panels by a whole number smaller than they are drawn.
-    fn shrunk(&self, panels: &[Panel<'_>], by: usize) -> RgbImage {
         let mesh = self.mesh;
         let ranges: Vec<Range> = (panels.iter())
             .map(|panel| Range::of(mesh, panel.log_scale))
@@ -85,7 +71,7 @@ impl<'a> Gallery<'a> {
         let least = reaches.clone().fold(f64::INFINITY, f64::min);
         let greatest = reaches.fold(0.0, f64::max);
         let reach = (least * greatest).sqrt();
-        let side = self.side / by;
+        let side = self.side;
         let lines = panels.iter().map(|p| p.title.len()).max().unwrap_or(0);
         let head = lines * LINE + 2 * MARGIN;
         // The bar of colours has a place of its own, beside panels that have room for it.
@@ -95,26 +81,17 @@ impl<'a> Gallery<'a> {
         let mut image = RgbImage::from_pixel(width as u32, height as u32, Rgb(PAPER));
         for (k, (panel, range)) in panels.iter().zip(ranges).enumerate() {
             let range = Range { reach, ..range };
-            let scale = Scale::new(mesh, panel.log_scale, range);
-            let paint = |face, weights, _| scale.colour(face, weights);
-            let left = k * side;
+            let paint = |spot: &Spot| range.colour(mesh, panel.log_scale, spot);
+            let (left, marks) = (k * side, marks(panel));
             for (row, studio) in self.studios.iter().enumerate() {
-                let props = studio.place(marks(studio, panel));
-                let drawn = studio.draw(&props, &Paint::Smooth(&paint));
-                let drawn = match by {
-                    1 => drawn,
-                    _ => {
-                        let side = side as u32;
-                        imageops::resize(&drawn, side, side, imageops::FilterType::Triangle)
-                    }
-                };
+                let [drawn] = studio.draw(&marks, [&paint]);
                 let top = head + row * side;
                 imageops::replace(&mut image, &drawn, left as i64, top as i64);
             }
             for (line, words) in panel.title.iter().enumerate() {
                 let middle = (left + side / 2) as f64;
                 let y = (MARGIN + line * LINE + LINE / 2) as f64;
-                text::write(&mut image, words, [middle, y], Anchor::Middle, INK);
+                text::write(&mut image, words, [middle, y], 0.5, INK);
             }
         }
         if strip > 0 {
@@ -128,17 +105,13 @@ impl<'a> Gallery<'a> {
     }
 }
 
-fn marks(studio: &Studio<'_>, panel: &Panel<'_>) -> Marks {
-    let mut marks = Marks::default();
-    for &[a, b] in panel.cut {
-        marks.cut_edge(a, b, studio.length(CUT_RADIUS, a));
-    }
-    for &(place, curvature) in &panel.cones {
+fn marks(panel: &Panel<'_>) -> Vec<Mark> {
+    let cut = panel.cut.iter().map(|&ends| Mark::cut(ends));
+    let cones = panel.cones.iter().map(|&(place, curvature)| {
         // Areas of the balls are as the curvatures.
         let relative = (curvature.abs() / FRAC_PI_2).sqrt();
         let [least, greatest] = CONE_SIZES;
-        let radius = relative.clamp(least, greatest) * studio.length(CONE_RADIUS, place);
-        marks.cone(place, curvature, radius);
-    }
-    marks
+        Mark::cone(place, curvature, relative.clamp(least, greatest))
+    });
+    cut.chain(cones).collect()
 }

@@ -2,47 +2,37 @@
 //!
 //! *Enters:* an [`AffineAtlas`], or several metrics on one mesh. *Leaves:* images in memory.
 //!
-//! * [`preview`]: the surface in space with a checkerboard in flat coordinates, cones and cut.
-//! * [`log_scale`]: the surface in space coloured by the log scale.
+//! * [`surface()`]: the surface in space with a checkerboard in flat coordinates, cones and cut; and coloured by the log scale.
 //! * [`painted`]: any surface in space in colours of its own.
 //! * [`layout()`]: the central chart and the packed patches in the plane.
 //! * [`convergence()`]: curvature error against flow time (Fig. 7 of the tutorial).
 //! * [`Gallery`]: log scales of several metrics on one surface, side by side.
 //! * [`encode_png`]: an image as the bytes of a PNG file.
 //!
-//! Pictures of space are made in three steps: `view` looks for a direction that shows much of the
-//! surface, `light` bakes soft light into the vertices, and `raster` finds which triangle each sample of each
-//! pixel sees (all three stand ready in a `studio`); what that sample looks like is computed afterwards, once a sample,
-//! by `paint`.
-//!
-//! Directions are chosen and light is baked on a stand-in of bounded size (`coarse`) where a surface has very many faces.
+//! `view` looks for a direction that shows much of the surface, `raster` finds what each sample of each pixel sees, and `studio` lights it.
 //!
 //! Not guaranteed: equal bytes on different platforms (sines and powers differ in the last bit).
 
+mod ambient;
 mod canvas;
 pub(crate) mod checkerboard;
-mod coarse;
 pub(crate) mod colour;
-mod convergence;
+pub(crate) mod convergence;
 mod floor;
 mod gallery;
 mod layout;
-mod light;
-mod paint;
 mod raster;
 pub(crate) mod scale;
-mod scene;
-mod size;
 mod studio;
 mod surface;
 mod text;
 mod view;
 
+pub use canvas::SIDE_RANGE;
 pub use convergence::convergence;
 pub use gallery::{Gallery, Panel};
 pub use layout::layout;
-pub use size::SIDE_RANGE;
-pub use surface::{log_scale, painted, preview};
+pub use surface::{painted, surface};
 
 use crate::export::ExportError;
 use crate::export::folder::Staging;
@@ -58,12 +48,11 @@ pub fn write(
     atlas: &AffineAtlas,
     size: usize,
 ) -> Result<(), ExportError> {
-    // One view and one light for both pictures of space.
-    let portrait = surface::Portrait::new(atlas, size);
+    let [preview, log_scale] = surface(atlas, size);
     let pictures = [
-        (names::PREVIEW, portrait.preview()),
+        (names::PREVIEW, preview),
         ("layout.png", layout(atlas, size)),
-        ("log-scale.png", portrait.log_scale()),
+        ("log-scale.png", log_scale),
         ("convergence.png", convergence(atlas, size)),
     ];
     for (name, picture) in pictures {
@@ -87,7 +76,7 @@ where
 {
     use image::codecs::png::{CompressionType, FilterType, PngEncoder};
     let mut bytes = Vec::new();
-    PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive)
+    PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Paeth)
         .write_image(image.as_raw(), image.width(), image.height(), P::COLOR_TYPE)?;
     Ok(bytes)
 }

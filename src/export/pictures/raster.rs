@@ -1,178 +1,199 @@
-//! Which triangle does a sample see? A depth-buffered rasteriser that leaves shading for later.
+//! Which triangle does a sample see? Scan conversion with a depth buffer; shading comes later.
+//!
+//! A pixel has [`SAMPLES`] samples, one in each of as many rows, at staggered columns, so that nearly upright and nearly level edges get as
+//! many shades as there are samples. Rows are rows of samples, columns are columns of pixels.
 
 use std::ops::Range;
 
-/// What stands where no triangle is seen.
+/// Samples of a pixel.
+pub const SAMPLES: usize = 4;
+/// Where the samples of a pixel lie between its left and its right.
+const COLUMNS: [f64; SAMPLES] = [0.375, 0.875, 0.125, 0.625];
+/// What stands where nothing is seen.
 pub const NOTHING: u32 = u32::MAX;
 
-/// A triangle on the screen: column, row, and closeness (larger is nearer) at each corner.
-///
-/// Closeness must be linear on the screen: 1 / depth under perspective, −depth without.
-pub type ScreenTriangle = [[f64; 3]; 3];
-
-/// The nearest triangle at every sample of some rows of the screen.
-pub struct Band {
-    width: usize,
-    /// First row.
-    top: usize,
-    closeness: Vec<f32>,
-    object: Vec<u32>,
+/// Where a sample lies, in pixels.
+pub fn place(column: usize, row: usize) -> [f64; 2] {
+    let y = (row as f64 + 0.5) / SAMPLES as f64;
+    [column as f64 + COLUMNS[row % SAMPLES], y]
 }
 
-impl Band {
-    /// Rows `top..top + rows`, nothing drawn yet.
-    pub fn new(width: usize, top: usize, rows: usize) -> Band {
-        Band {
-            width,
-            top,
-            closeness: vec![f32::NEG_INFINITY; width * rows],
-            object: vec![NOTHING; width * rows],
+/// Rounds up; below 0 it is 0. A cast, since the library's function is a call on older processors.
+fn up(x: f64) -> usize {
+    let whole = x as usize;
+    whole.saturating_add(usize::from((whole as f64) < x))
+}
+
+/// The first row of samples at or below a height in pixels.
+fn row_at(y: f64) -> usize {
+    up(y * SAMPLES as f64 - 0.5)
+}
+
+/// The columns of a row whose samples lie from `low` up to `high`.
+fn columns(row: usize, low: f64, high: f64, width: usize) -> Range<usize> {
+    let shift = COLUMNS[row % SAMPLES];
+    up(low - shift)..up(high - shift).min(width)
+}
+
+/// Calls `visit(row, columns)` for every row of a triangle given in pixels, whichever way it is turned. A sample on the common edge of two
+/// triangles belongs to exactly one of them.
+pub fn covered(
+    corners: [[f64; 2]; 3],
+    width: usize,
+    rows: Range<usize>,
+    mut visit: impl FnMut(usize, Range<usize>),
+) {
+    if corners.iter().flatten().any(|x| !x.is_finite()) {
+        return;
+    }
+    // From top to bottom, so that an edge has the same numbers in both of its triangles.
+    let mut sorted = corners;
+    sorted.sort_unstable_by(|p, q| p[1].total_cmp(&q[1]));
+    let [a, b, c] = sorted;
+    let middle = row_at(b[1]);
+    for row in row_at(a[1]).max(rows.start)..row_at(c[1]).min(rows.end) {
+        let y = (row as f64 + 0.5) / SAMPLES as f64;
+        let crossing = |p: [f64; 2], q: [f64; 2]| {
+            p[0] + (q[0] - p[0]) * ((y - p[1]) / (q[1] - p[1])).clamp(0.0, 1.0)
+        };
+        let long = crossing(a, c);
+        let short = if row < middle {
+            crossing(a, b)
+        } else {
+            crossing(b, c)
+        };
+        let columns = columns(row, long.min(short), long.max(short), width);
+        if !columns.is_empty() {
+            visit(row, columns);
         }
     }
-
-    /// Draws a triangle, whichever way it is turned. Of equally close ones the first stays.
-    pub fn draw(&mut self, triangle: &ScreenTriangle, object: u32) {
-        let rows = self.object.len() / self.width.max(1);
-        let (top, width) = (self.top, self.width);
-        covered(
-            triangle,
-            [width, top + rows],
-            top,
-            |column, row, weights| {
-                let near = (0..3).map(|k| weights[k] * triangle[k][2]).sum::<f64>() as f32;
-                let at = (row - top) * width + column;
-                if near > self.closeness[at] {
-                    self.closeness[at] = near;
-                    self.object[at] = object;
-                }
-            },
-        );
-    }
-
-    /// The triangle seen at a sample, [`NOTHING`] where none is.
-    pub fn object(&self, column: usize, row: usize) -> u32 {
-        self.object[(row - self.top) * self.width + column]
-    }
-
-    /// Closeness of what is seen, −∞ where nothing is.
-    pub fn closeness(&self, column: usize, row: usize) -> f32 {
-        self.closeness[(row - self.top) * self.width + column]
-    }
 }
 
-/// Calls `visit(column, row, weights)` for every sample (the centre of a cell of the grid) inside a triangle; weights sum to 1.
-/// A sample on the common edge of two triangles belongs to exactly one of them.
-/// `end` holds the columns and the row after the last, `top` is the first row.
-pub fn covered(
-    triangle: &ScreenTriangle,
-    end: [usize; 2],
-    top: usize,
-    mut visit: impl FnMut(usize, usize, [f64; 3]),
+/// Calls `visit(column, row, t, d²)` for every sample at most `radius` away from a segment, all in pixels: `t` from 0 to 1 says where on the
+/// segment the nearest point lies, `d²` is the squared distance from it.
+pub fn stroked(
+    [a, b]: [[f64; 2]; 2],
+    radius: f64,
+    width: usize,
+    rows: Range<usize>,
+    mut visit: impl FnMut(usize, usize, f64, f64),
 ) {
-    if triangle.iter().flatten().any(|x| !x.is_finite()) {
+    if !a.iter().chain(&b).all(|x| x.is_finite()) {
         return;
     }
-    let [a, b, c] = triangle;
-    let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-    if area == 0.0 {
-        return;
-    }
-    let range = |axis: usize, first: usize, end: usize| {
-        let low = a[axis].min(b[axis]).min(c[axis]);
-        let high = a[axis].max(b[axis]).max(c[axis]);
-        // Rounded up and down by casts, which saturate; the library's functions are calls on older processors.
-        let low = (low - 0.5).max(first as f64);
-        let from = low as usize + usize::from((low as usize as f64) < low);
-        let high = high - 0.5;
-        let to = if high < 0.0 {
-            0
-        } else {
-            (high as usize).saturating_add(1).min(end)
+    let axis = [b[0] - a[0], b[1] - a[1]];
+    let length2 = axis[0] * axis[0] + axis[1] * axis[1];
+    let top = row_at(a[1].min(b[1]) - radius).max(rows.start);
+    for row in top..row_at(a[1].max(b[1]) + radius).min(rows.end) {
+        // The part of the segment that is near this row.
+        let y = (row as f64 + 0.5) / SAMPLES as f64;
+        let (at, half) = ((y - a[1]) / axis[1], radius / axis[1].abs());
+        let ends = match half.is_finite() {
+            true => [at - half, at + half].map(|t| a[0] + axis[0] * t.clamp(0.0, 1.0)),
+            false => [a[0], b[0]],
         };
-        from..to
-    };
-    let columns = range(0, 0, end[0]);
-    let rows = range(1, top, end[1]);
-    // Most faces of a fine mesh lie between samples.
-    if columns.is_empty() || rows.is_empty() {
-        return;
-    }
-    let sides = [(b, c), (c, a), (a, b)].map(|(from, to)| Side::new(from, to, area));
-    for row in rows {
-        let y = row as f64 + 0.5;
-        let rises = sides
-            .each_ref()
-            .map(|side| side.run[0] * (y - side.from[1]));
-        let mut entered = false;
-        for column in between(&columns, &sides, &rises) {
-            let x = column as f64 + 0.5;
-            let parts = [0, 1, 2].map(|k| sides[k].part(x, rises[k]));
-            if let [Some(x), Some(y), Some(z)] = parts {
-                entered = true;
-                let sum = x + y + z;
-                if sum > 0.0 {
-                    visit(column, row, [x / sum, y / sum, z / sum]);
-                }
-            } else if entered {
-                // A row of a convex shape is left once.
-                break;
+        let low = ends[0].min(ends[1]) - radius;
+        for column in columns(row, low, ends[0].max(ends[1]) + radius, width) {
+            let [x, y] = place(column, row);
+            let d = [x - a[0], y - a[1]];
+            let along = d[0] * axis[0] + d[1] * axis[1];
+            let t = if along > 0.0 {
+                (along / length2).min(1.0)
+            } else {
+                0.0
+            };
+            let off = [d[0] - t * axis[0], d[1] - t * axis[1]];
+            let d2 = off[0] * off[0] + off[1] * off[1];
+            if d2 <= radius * radius {
+                visit(column, row, t, d2);
             }
         }
     }
 }
 
-/// The columns of a row that may lie inside: where the sides meet the row, and a sample more at both ends, so that [`Side::part`] alone
-/// decides. Walking over the whole box of a long thin triangle takes as long as filling it.
-fn between(columns: &Range<usize>, sides: &[Side; 3], rises: &[f64; 3]) -> Range<usize> {
-    let (mut low, mut high) = (columns.start as f64, columns.end as f64);
-    for (side, &rise) in sides.iter().zip(rises) {
-        let along = rise / side.run[1];
-        if !along.is_finite() {
-            continue;
-        }
-        let column = side.from[0] + along - 0.5;
-        let slack = 1.0 + 1e-12 * (along.abs() + side.from[0].abs());
-        // The distance falls from left to right where the side rises.
-        match side.inward_is_positive == (side.run[1] > 0.0) {
-            true => high = high.min(column + slack + 1.0),
-            false => low = low.max(column - slack),
-        }
-    }
-    // Casts saturate.
-    low as usize..high as usize
+/// The nearest object at every sample of some rows.
+pub struct Band {
+    width: usize,
+    /// First row.
+    top: usize,
+    /// Objects and their closeness.
+    samples: Vec<(u32, f32)>,
 }
 
-/// The line through two corners of a triangle.
-///
-/// It runs from the lower end whichever way the edge does, so that both triangles at an edge get the same
-/// numbers, and a sample exactly on it goes to the one whose side counts as positive.
-struct Side {
-    from: [f64; 2],
-    run: [f64; 2],
-    inward_is_positive: bool,
-}
-
-impl Side {
-    fn new(a: &[f64; 3], b: &[f64; 3], area: f64) -> Side {
-        let swapped = (a[0], a[1]) > (b[0], b[1]);
-        let (from, to) = if swapped { (b, a) } else { (a, b) };
-        Side {
-            from: [from[0], from[1]],
-            run: [to[0] - from[0], to[1] - from[1]],
-            inward_is_positive: (area > 0.0) != swapped,
+impl Band {
+    /// Nothing drawn yet.
+    pub fn new(width: usize, rows: Range<usize>) -> Band {
+        Band {
+            width,
+            top: rows.start,
+            samples: vec![(NOTHING, f32::NEG_INFINITY); width * rows.len()],
         }
     }
 
-    /// Distance of a sample from the line times the side's length, where it lies on the triangle's side of it.
-    /// `rise` is the row's part of the cross product.
-    #[inline]
-    fn part(&self, x: f64, rise: f64) -> Option<f64> {
-        let cross = rise - self.run[1] * (x - self.from[0]);
-        if self.inward_is_positive {
-            (cross >= 0.0).then_some(cross)
-        } else {
-            (cross < 0.0).then_some(-cross)
+    /// Faces on the screen, each with its number.
+    pub fn of(width: usize, rows: Range<usize>, faces: &[[u32; 3]], screen: &[[f64; 3]]) -> Band {
+        let mut band = Band::new(width, rows);
+        for (number, face) in (0..).zip(faces) {
+            band.draw(&face.map(|v| screen[v as usize]), number);
         }
+        band
+    }
+
+    /// Its rows.
+    fn rows(&self) -> Range<usize> {
+        self.top..self.top + self.samples.len() / self.width.max(1)
+    }
+
+    /// Draws a triangle of column, row (in pixels) and closeness. Closeness must be linear on the screen: 1 / depth under perspective, −depth
+    /// without. Of equally close ones the first stays.
+    pub fn draw(&mut self, triangle: &[[f64; 3]; 3], object: u32) {
+        let (width, top, rows) = (self.width, self.top, self.rows());
+        let [a, b, c] = triangle;
+        let [ab, ac] = [b, c].map(|p| [0, 1, 2].map(|i| p[i] - a[i]));
+        let area = ab[0] * ac[1] - ab[1] * ac[0];
+        let slope = [
+            (ab[2] * ac[1] - ac[2] * ab[1]) / area,
+            (ac[2] * ab[0] - ab[2] * ac[0]) / area,
+        ];
+        // Triangles seen edge-on have no slope.
+        let (low, high) = (a[2].min(b[2]).min(c[2]), a[2].max(b[2]).max(c[2]));
+        covered(
+            triangle.map(|p| [p[0], p[1]]),
+            width,
+            rows,
+            |row, columns| {
+                let [x, y] = place(columns.start, row);
+                let first = a[2] + slope[0] * (x - a[0]) + slope[1] * (y - a[1]);
+                let at = (row - top) * width;
+                let samples = &mut self.samples[at + columns.start..at + columns.end];
+                for (k, sample) in samples.iter_mut().enumerate() {
+                    let near = (first + slope[0] * k as f64).max(low).min(high) as f32;
+                    if near > sample.1 {
+                        *sample = (object, near);
+                    }
+                }
+            },
+        );
+    }
+
+    /// Draws a ball, or a round bar with round ends, by the ends of its axis and its radius; `bulge` is the closeness relative to the axis of
+    /// what is a pixel nearer.
+    pub fn draw_bar(&mut self, [a, b]: [[f64; 3]; 2], radius: f64, bulge: f64, object: u32) {
+        let (width, top, rows) = (self.width, self.top, self.rows());
+        let axis = [a, b].map(|p| [p[0], p[1]]);
+        stroked(axis, radius, width, rows, |column, row, t, d2| {
+            let near = a[2] + t * (b[2] - a[2]);
+            let near = near * (1.0 + bulge * (radius * radius - d2).max(0.0).sqrt());
+            let sample = &mut self.samples[(row - top) * width + column];
+            if near as f32 > sample.1 {
+                *sample = (object, near as f32);
+            }
+        });
+    }
+
+    /// What is seen at a sample, [`NOTHING`] where nothing is, and its closeness.
+    pub fn seen(&self, column: usize, row: usize) -> (u32, f32) {
+        self.samples[(row - self.top) * self.width + column]
     }
 }
 
@@ -191,20 +212,19 @@ mod tests {
             [15.5, 19.5],
             [4.5, 17.5],
         ];
-        // The centre lies on a sample, and so do many edges.
-        let centre = [9.5, 9.5, 1.0];
-        let mut count = vec![0; 400];
+        // The centre lies on a sample.
+        let centre = place(9, 38);
+        let mut count = vec![0; 20 * 80];
         for k in 0..rim.len() {
-            let corner = |k: usize| [rim[k % 6][0], rim[k % 6][1], 1.0];
+            let corner = |k: usize| rim[k % 6];
             // Every second one is turned the other way round.
             let (a, b) = if k % 2 == 0 { (k, k + 1) } else { (k + 1, k) };
-            covered(&[centre, corner(a), corner(b)], [20, 20], 0, |x, y, w| {
-                assert!((w.iter().sum::<f64>() - 1.0).abs() < 1e-12);
-                count[20 * y + x] += 1;
+            covered([centre, corner(a), corner(b)], 20, 0..80, |row, columns| {
+                columns.for_each(|column| count[20 * row + column] += 1);
             });
         }
         assert!(count.iter().all(|&c| c <= 1));
-        let inside = (3..15).flat_map(|y| (5..15).map(move |x| (x, y)));
+        let inside = (12..60).flat_map(|y| (5..15).map(move |x| (x, y)));
         for (x, y) in inside {
             assert_eq!(count[20 * y + x], 1, "at {x}, {y}");
         }
@@ -214,18 +234,17 @@ mod tests {
     fn the_nearer_triangle_wins_in_any_order() {
         let big = |near: f64| [[0.0, 0.0, near], [40.0, 0.0, near], [0.0, 40.0, near]];
         for order in [[0, 1], [1, 0]] {
-            let mut band = Band::new(10, 0, 10);
+            let mut band = Band::new(10, 0..40);
             for object in order {
                 band.draw(&big(1.0 + f64::from(object)), object);
             }
-            assert_eq!(band.object(3, 3), 1);
-            assert_eq!(band.closeness(3, 3), 2.0);
+            assert_eq!(band.seen(3, 12), (1, 2.0));
         }
     }
 
     #[test]
     fn what_cannot_be_drawn_is_left_out() {
-        let mut band = Band::new(10, 5, 5);
+        let mut band = Band::new(10, 20..40);
         band.draw(
             &[[f64::NAN, 0.0, 1.0], [9.0, 0.0, 1.0], [0.0, 90.0, 1.0]],
             0,
@@ -235,9 +254,11 @@ mod tests {
             &[[-1e300, -1e300, 1.0], [-1e299, 0.0, 1.0], [-9.0, 9.0, 1.0]],
             2,
         );
-        for row in 5..10 {
+        band.draw_bar([[f64::NAN, 7.0, 1.0], [5.0, 7.0, 1.0]], 3.0, 0.1, 3);
+        band.draw_bar([[-1e300, -9.0, 1.0], [1e300, -9.0, 1.0]], 3.0, 0.1, 4);
+        for row in 20..40 {
             for column in 0..10 {
-                assert_eq!(band.object(column, row), NOTHING);
+                assert_eq!(band.seen(column, row).0, NOTHING);
             }
         }
     }

@@ -1,9 +1,10 @@
 //! Colours for the log scale: blue where the flat metric shrinks the surface, red where it grows.
 
-use super::checkerboard::weighted_quantile;
+use super::checkerboard::{ascending, weighted_quantile};
 use super::colour::{INK, Linear, diverging, to_linear};
-use super::text::{self, Anchor};
-use crate::geometry::ids::{FaceId, VertexId};
+use super::studio::Spot;
+use super::text;
+use crate::geometry::ids::FaceId;
 use crate::geometry::mesh::{Mesh, triangle_area};
 use image::{Rgb, RgbImage};
 
@@ -28,15 +29,23 @@ impl Range {
                 areas[v.index()] += area;
             }
         }
-        let mut sorted: Vec<(f64, f64)> = (values.iter().copied().zip(areas))
-            .filter(|(x, area)| x.is_finite() && area.is_finite())
-            .collect();
-        sorted.sort_by(|x, y| x.0.total_cmp(&y.0));
+        let sorted = ascending(values.iter().copied().zip(areas));
         let middle = weighted_quantile(&sorted, 0.5);
         let reach = (weighted_quantile(&sorted, 0.995) - middle)
             .max(middle - weighted_quantile(&sorted, 0.005));
         let reach = if reach > 0.0 { reach } else { 1.0 };
         Range { middle, reach }
+    }
+
+    /// Colour of a spot of the surface by the values at the vertices of its face.
+    pub(super) fn colour(self, mesh: &Mesh, values: &[f64], spot: &Spot) -> Linear {
+        let corners = mesh.connectivity.face_vertices(FaceId::new(spot.face));
+        let value = |k: usize| {
+            let value = values.get(corners[k].index()).copied();
+            spot.weights[k] * value.unwrap_or(f64::NAN)
+        };
+        let value = value(0) + value(1) + value(2);
+        to_linear(diverging((value - self.middle) / self.reach))
     }
 
     /// A vertical bar of colours with numbers, at the right; left out of small pictures.
@@ -58,35 +67,9 @@ impl Range {
         for t in [-1.0, 0.0, 1.0] {
             let y = 0.5 * ((top + bottom) as f64 - t * (bottom - top) as f64);
             let words = format!("{:+.2}", middle + t * reach);
-            text::write(image, &words, [left as f64 - 6.0, y], Anchor::End, INK);
+            text::write(image, &words, [left as f64 - 6.0, y], 1.0, INK);
         }
         let at = [right as f64 - 12.0, top as f64 - 18.0];
-        text::write(image, title, at, Anchor::End, INK);
-    }
-}
-
-/// Values at the vertices of a mesh in the colours of a range.
-pub(super) struct Scale<'a> {
-    mesh: &'a Mesh,
-    values: &'a [f64],
-    range: Range,
-}
-
-impl<'a> Scale<'a> {
-    /// `values` holds one for each vertex of the mesh.
-    pub fn new(mesh: &'a Mesh, values: &'a [f64], range: Range) -> Scale<'a> {
-        Scale {
-            mesh,
-            values,
-            range,
-        }
-    }
-
-    /// Colour of a point of a face by its barycentric weights.
-    pub fn colour(&self, face: usize, weights: [f64; 3]) -> Linear {
-        let corners = self.mesh.connectivity.face_vertices(FaceId::new(face));
-        let value = |v: VertexId| self.values.get(v.index()).copied().unwrap_or(f64::NAN);
-        let value: f64 = (0..3).map(|k| weights[k] * value(corners[k])).sum();
-        to_linear(diverging((value - self.range.middle) / self.range.reach))
+        text::write(image, title, at, 1.0, INK);
     }
 }

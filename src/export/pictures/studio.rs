@@ -1,296 +1,316 @@
-//! The surface with its view and its light, made once for all pictures of it, and the marks that stand on it.
+//! A surface with its view and its light, and the pictures of it.
 //!
-//! *Enters:* a mesh and a size. *Leaves:* a [`Studio`] that knows what each part of the picture shows and how light it is, for
-//! [`paint`](super::paint) to be given colours; and [`Props`]: balls and bars in the same light. The view and the light
-//! depend on the mesh only, so pictures of different metrics on one mesh can be laid side by side.
+//! *Enters:* a mesh, a size, marks and what the surface looks like without light. *Leaves:* pictures. The view and the light depend
+//! on the mesh only, so pictures of different metrics on one mesh can be laid side by side.
+//!
+//! What the samples of each pixel see is found first; each object is then shaded once a pixel, at the middle of its samples. Light comes from
+//! the sky and the ground, a lamp and a fill light; nearby parts of the surface take some of it ([`Ambient`]).
 
-use super::coarse::{Coarse, coarse};
+use super::ambient::{Ambient, COARSER, Point};
+use super::colour::{CUT, Linear, NEGATIVE, POSITIVE, mix, to_bytes, to_linear};
 use super::floor::Floor;
-use super::light::{Lights, Shade};
-use super::raster::{Band, NOTHING};
-use super::scene::Marks;
-use super::view::{Camera, Vec3, along, choose_direction, unit};
-use crate::geometry::connectivity::Connectivity;
+use super::raster::{Band, NOTHING, SAMPLES, place};
+use super::view::{Camera, Vec3, along, is_behind, unit};
 use crate::geometry::ids::FaceId;
 use crate::geometry::mesh::{Mesh, cross, dot, norm, sub};
+use image::{Rgb, RgbImage};
 use rayon::prelude::*;
 
-/// Samples along each side of a pixel.
-pub(super) const SAMPLES: usize = 3;
 /// Rows of pixels that are drawn at a time.
-pub(super) const BAND: usize = 16;
+const BAND: usize = 32;
 /// Faces that meet at less than this share a smooth normal: cosine of 40°.
 const CREASE: f64 = 0.766;
-/// Surfaces of more faces have a stand-in where the direction is chosen, with so many cells along their longest side …
-const VIEWED: (usize, u32) = (60_000, 96);
-/// … and where light is baked.
-const LIT: (usize, u32) = (200_000, 192);
+/// Radius of a bar along the cut, in sides of the picture.
+const CUT_RADIUS: f64 = 0.0026;
+/// Radius of the ball at a cone, likewise.
+const CONE_RADIUS: f64 = 0.0125;
 
-/// The surface with its view and light, ready to be painted in several ways.
-pub(super) struct Studio<'a> {
-    pub mesh: &'a Mesh,
-    pub camera: Camera,
-    pub positions: &'a [Vec3],
-    pub faces: Vec<[u32; 3]>,
-    /// Vertices on the screen.
-    pub screen: Vec<Vec3>,
-    /// Faces that some sample sees, a list a band.
-    pub seen: Vec<Vec<u32>>,
-    /// Unit normals of the corners of faces that are seen, and where they stand for each face.
-    pub normals: Vec<[Vec3; 3]>,
-    pub normals_of: Vec<u32>,
-    /// Light on the outside and on the inside of every vertex that is seen; of a closed surface on the outside only.
-    pub shade: [Vec<Shade>; 2],
-    pub floor: Floor,
-    lights: Lights,
-    pub lamp: Vec3,
-    pub fill: Vec3,
-    /// Pixels along a side of the picture.
-    pub size: usize,
-    /// Samples along a side of the picture.
-    pub side: usize,
+/// Tint of the back of the surface.
+const INSIDE: Linear = [0.55, 0.40, 0.30];
+
+/// A point of the surface that a pixel shows.
+pub struct Spot {
+    /// Its face.
+    pub face: usize,
+    /// Its barycentric weights.
+    pub weights: [f64; 3],
+    /// By how much these change to the next pixel to the right, …
+    pub right: [f64; 3],
+    /// … and to the one below.
+    pub down: [f64; 3],
 }
 
-/// Marks with their place on the screen and their light.
-pub(super) struct Props {
-    pub marks: Marks,
-    /// Their vertices on the screen.
-    pub screen: Vec<Vec3>,
-    /// Light on their vertices.
-    pub shade: Vec<Shade>,
-    /// Their triangles that reach into each band.
-    pub members: Vec<Vec<u32>>,
+/// What a spot looks like without light.
+pub(super) type Paint<'a> = dyn Fn(&Spot) -> Linear + Sync + 'a;
+
+/// A ball or a bar with round ends, by the ends of its axis.
+pub(super) struct Mark {
+    ends: [Vec3; 2],
+    /// In sides of the picture.
+    radius: f64,
+    colour: Linear,
 }
 
-impl<'a> Studio<'a> {
-    /// Chooses the view and lights the scene for a picture of `size` × `size` pixels, held to the range of sizes.
-    pub fn new(mesh: &'a Mesh, size: usize) -> Studio<'a> {
-        Self::seen_from(mesh, size, direction(mesh))
+impl Mark {
+    /// An edge of the cut.
+    pub fn cut(ends: [Vec3; 2]) -> Mark {
+        let colour = to_linear(CUT);
+        Mark {
+            ends,
+            radius: CUT_RADIUS,
+            colour,
+        }
     }
 
-    /// The same from a direction, a unit vector from the scene to the eye.
-    pub fn seen_from(mesh: &'a Mesh, size: usize, direction: Vec3) -> Studio<'a> {
-        let size = super::size::side(size);
-        let connectivity = &mesh.connectivity;
-        let positions = mesh.positions.as_slice();
-        let faces = connectivity.to_faces();
-        let vertex_normals = vertex_normals(positions, &faces);
-        let few = stand_in(LIT, positions, &vertex_normals, &faces);
-        let side = size * SAMPLES;
-        let camera = Camera::looking_from(direction, positions, side as f64);
-        let oriented = |r: f64, u: f64, b: f64| {
-            let frame = [camera.right, camera.up, camera.back];
-            unit(std::array::from_fn(|i| {
-                r * frame[0][i] + u * frame[1][i] + b * frame[2][i]
-            }))
-        };
-        let (lamp, fill) = (oriented(-0.55, 0.75, 0.55), oriented(0.8, 0.15, 0.5));
-        let up = [0.0, 1.0, 0.0];
-        let lights = match few {
-            Some(few) => Lights::new(&few.positions, &few.faces, lamp, up),
-            None => Lights::new(positions, &faces, lamp, up),
-        };
+    /// A cone: a ball so many times the usual size, red where the curvature is positive and blue where it is negative.
+    pub fn cone(at: Vec3, curvature: f64, size: f64) -> Mark {
+        let colour = to_linear(if curvature > 0.0 { POSITIVE } else { NEGATIVE });
+        Mark {
+            ends: [at; 2],
+            radius: size * CONE_RADIUS,
+            colour,
+        }
+    }
+}
+
+/// The surface with its view and light, ready to be painted in several ways.
+pub(super) struct Studio {
+    camera: Camera,
+    positions: Vec<Vec3>,
+    faces: Vec<[u32; 3]>,
+    /// Vertices on the screen.
+    screen: Vec<Vec3>,
+    /// Unit normals of the corners of faces.
+    normals: Vec<[Vec3; 3]>,
+    floor: Floor,
+    ambient: Ambient,
+    lamp: Vec3,
+    fill: Vec3,
+    /// Pixels along a side of the picture.
+    size: usize,
+}
+
+impl Studio {
+    /// Lights the scene for a picture of `size` × `size` pixels, held to the range of sizes, seen from a direction, a unit vector from the
+    /// scene to the eye.
+    pub fn new(mesh: &Mesh, size: usize, direction: Vec3) -> Studio {
+        let size = super::canvas::side(size);
+        let positions = mesh.positions.as_slice().to_vec();
+        let faces = mesh.connectivity.to_faces();
+        let camera = Camera::looking_from(direction, &positions, size as f64);
+        let [lamp, fill] = [[-0.55, 0.75, 0.55], [0.8, 0.15, 0.5]].map(|d| camera.oriented(d));
         let mut studio = Studio {
-            mesh,
             size,
             screen: positions.iter().map(|&p| camera.project(p)).collect(),
-            seen: Vec::new(),
-            normals: Vec::new(),
-            normals_of: Vec::new(),
-            shade: Default::default(),
-            floor: Floor::new(positions),
-            lights,
+            normals: corner_normals(mesh),
+            floor: Floor::new(&positions, &faces),
+            ambient: Ambient::default(),
+            lamp,
+            fill,
             camera,
             positions,
             faces,
-            lamp,
-            fill,
-            side,
         };
-        studio.seen = studio.look();
-        studio.light(&vertex_normals);
-        studio.smooth();
+        studio.ambient = studio.look_around();
         studio
     }
 
-    /// Source units that a share of the picture's side has at a point's depth.
-    pub fn length(&self, share: f64, p: Vec3) -> f64 {
-        let (camera, side) = (&self.camera, self.side as f64);
-        share * side / (camera.zoom * camera.project(p)[2]).max(f64::MIN_POSITIVE)
-    }
-
-    /// Puts marks into the scene.
-    pub fn place(&self, marks: Marks) -> Props {
-        let screen: Vec<Vec3> = (marks.positions.iter())
-            .map(|&p| self.camera.project(p))
-            .collect();
-        let points: Vec<(Vec3, Vec3)> = (marks.positions.iter().copied())
-            .zip(marks.normals.iter().copied())
-            .collect();
-        Props {
-            shade: self.lights.shade(&points),
-            members: self.by_band(&marks.faces, &screen),
-            screen,
-            marks,
-        }
-    }
-
-    /// The triangles that reach into each band, so that each draws only its own.
-    fn by_band(&self, faces: &[[u32; 3]], screen: &[Vec3]) -> Vec<Vec<u32>> {
-        let bands = self.size.div_ceil(BAND);
-        let mut members: Vec<Vec<u32>> = vec![Vec::new(); bands];
-        for (object, face) in faces.iter().enumerate() {
-            let rows = face.map(|v| screen[v as usize][1]);
-            let low = rows.iter().copied().fold(f64::INFINITY, f64::min);
-            let high = rows.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            let band = |row: f64| (row / (BAND * SAMPLES) as f64).max(0.0) as usize;
-            if low <= high && low < self.side as f64 && high >= 0.0 {
-                for member in &mut members[band(low)..=band(high).min(bands - 1)] {
-                    member.push(object as u32);
-                }
-            }
-        }
-        members
-    }
-
-    /// The faces that some sample sees, a list a band, each in their order.
-    fn look(&self) -> Vec<Vec<u32>> {
-        let members = self.by_band(&self.faces, &self.screen);
-        let seen = |(b, member): (usize, &Vec<u32>)| {
-            let mut band = self.band(b * BAND);
-            for &face in member {
-                band.draw(&self.on_screen(face as usize), face);
-            }
-            let rows = b * BAND * SAMPLES..((b + 1) * BAND * SAMPLES).min(self.side);
-            let mut seen: Vec<u32> = rows
-                .flat_map(|y| (0..self.side).map(move |x| (x, y)))
-                .map(|(x, y)| band.object(x, y))
-                .filter(|&face| face != NOTHING)
-                .collect();
-            seen.sort_unstable();
-            seen.dedup();
-            seen
+    /// The points that a coarser picture shows, and what is near them.
+    fn look_around(&self) -> Ambient {
+        let side = self.size.div_ceil(COARSER);
+        let coarser = |p: &Vec3| [p[0] / COARSER as f64, p[1] / COARSER as f64, p[2]];
+        let screen: Vec<Vec3> = self.screen.iter().map(coarser).collect();
+        let band = Band::of(side, 0..side * SAMPLES, &self.faces, &screen);
+        let point = |at: usize| {
+            let (column, row) = (at % side, at / side * SAMPLES + SAMPLES / 2);
+            let (face, _) = band.seen(column, row);
+            let at = place(column, row).map(|x| x * COARSER as f64);
+            (face != NOTHING).then(|| self.point(&self.spot(face as usize, at)))
         };
-        members.par_iter().enumerate().map(seen).collect()
+        let points = (0..side * side).into_par_iter().map(point).collect();
+        let picture = self.size as f64 * self.camera.depth / self.camera.zoom;
+        Ambient::new(points, side, picture)
     }
 
-    /// Samples of a band, empty; `top` is its first row of pixels.
-    pub fn band(&self, top: usize) -> Band {
-        let rows = BAND.min(self.size - top);
-        Band::new(self.side, top * SAMPLES, rows * SAMPLES)
+    /// The pictures of the surface in each of the paints, with marks on it.
+    pub fn draw<const N: usize>(&self, marks: &[Mark], paints: [&Paint; N]) -> [RgbImage; N] {
+        let (size, count) = (self.size, self.faces.len() as u32);
+        // On the screen, with the radius in pixels.
+        let on_screen = |mark: &Mark| Mark {
+            ends: mark.ends.map(|p| self.camera.project(p)),
+            radius: mark.radius * size as f64,
+            ..*mark
+        };
+        let bars: Vec<Mark> = marks.iter().map(on_screen).collect();
+        let draw_band = |b: usize| {
+            let rows = b * BAND..((b + 1) * BAND).min(size);
+            let of_samples = rows.start * SAMPLES..rows.end * SAMPLES;
+            let mut band = Band::of(size, of_samples, &self.faces, &self.screen);
+            for (object, bar) in (count..).zip(&bars) {
+                band.draw_bar(bar.ends, bar.radius, 1.0 / self.camera.zoom, object);
+            }
+            let pixels = rows.flat_map(|row| (0..size).map(move |column| (column, row)));
+            let pixel = |(x, y)| self.pixel(&band, (x, y), &bars, paints);
+            pixels.map(pixel).collect::<Vec<[[u8; 3]; N]>>()
+        };
+        let bands = (0..size.div_ceil(BAND)).into_par_iter();
+        let pixels: Vec<[[u8; 3]; N]> = bands.flat_map_iter(draw_band).collect();
+        std::array::from_fn(|n| {
+            RgbImage::from_fn(size as u32, size as u32, |x, y| {
+                Rgb(pixels[y as usize * size + x as usize][n])
+            })
+        })
+    }
+
+    /// Colour of a pixel in each of the paints.
+    fn pixel<const N: usize>(
+        &self,
+        band: &Band,
+        (column, row): (usize, usize),
+        bars: &[Mark],
+        paints: [&Paint; N],
+    ) -> [[u8; 3]; N] {
+        let samples: [(u32, [f64; 2]); SAMPLES] = std::array::from_fn(|k| {
+            let row = SAMPLES * row + k;
+            (band.seen(column, row).0, place(column, row))
+        });
+        let mut sums = [[0.0_f32; 3]; N];
+        for (k, &(object, _)) in samples.iter().enumerate() {
+            if samples[..k].iter().any(|s| s.0 == object) {
+                continue;
+            }
+            let (mut count, mut at) = (0.0, [0.0; 2]);
+            for (_, p) in samples.iter().filter(|s| s.0 == object) {
+                count += 1.0;
+                at = [at[0] + p[0], at[1] + p[1]];
+            }
+            let at = at.map(|x| x / count);
+            let shade = |albedo: Linear, (diffuse, gloss): (Linear, f32)| -> Linear {
+                std::array::from_fn(|i| albedo[i] * diffuse[i] + gloss)
+            };
+            let colours = if object == NOTHING {
+                [self.background(at); N]
+            } else if let Some(mark) = (object as usize).checked_sub(self.faces.len()) {
+                let light = self.light(self.bar_normal(&bars[mark], at), at, 1.0, 0.22);
+                [shade(bars[mark].colour, light); N]
+            } else {
+                let spot = self.spot(object as usize, at);
+                let (position, normal) = self.point(&spot);
+                let open = self.ambient.at(at, (position, normal));
+                let light = self.light(normal, at, open, 0.10);
+                let behind = is_behind(&self.on_screen(spot.face));
+                paints.map(|paint| match paint(&spot) {
+                    albedo if behind => shade(mix(albedo, INSIDE, 0.35), light).map(|c| 0.75 * c),
+                    albedo => shade(albedo, light),
+                })
+            };
+            for (sum, colour) in sums.iter_mut().zip(colours) {
+                // Clamped before the mean, or highlights would have ragged edges.
+                let share = count as f32 / SAMPLES as f32;
+                *sum = std::array::from_fn(|i| sum[i] + share * colour[i].clamp(0.0, 1.0));
+            }
+        }
+        sums.map(to_bytes)
     }
 
     /// Corners of a face on the screen.
-    pub fn on_screen(&self, face: usize) -> [Vec3; 3] {
+    fn on_screen(&self, face: usize) -> [Vec3; 3] {
         self.faces[face].map(|v| self.screen[v as usize])
     }
 
-    /// Lights what is seen: outside, inside where it can be seen, and floor.
-    fn light(&mut self, vertex_normals: &[Vec3]) {
-        let mut is_seen = vec![false; self.positions.len()];
-        for &face in self.seen.iter().flatten() {
-            let corners = self.faces[face as usize];
-            corners.iter().for_each(|&v| is_seen[v as usize] = true);
-        }
-        let vertices: Vec<usize> = (0..is_seen.len()).filter(|&v| is_seen[v]).collect();
-        let sides: &[f64] = if self.mesh.connectivity.is_closed() {
-            &[1.0]
-        } else {
-            &[1.0, -1.0]
+    /// The spot of a face at a place of the picture.
+    fn spot(&self, face: usize, at: [f64; 2]) -> Spot {
+        let screen = self.on_screen(face);
+        // Weights on the screen with their slopes; closeness undoes the perspective.
+        let parts = [0, 1, 2].map(|k| {
+            let (p, q, near) = (screen[(k + 1) % 3], screen[(k + 2) % 3], screen[k][2]);
+            let (right, down) = (near * (p[1] - q[1]), near * (q[0] - p[0]));
+            [right * (at[0] - p[0]) + down * (at[1] - p[1]), right, down]
+        });
+        let [sum, right, down] = [0, 1, 2].map(|i| parts[0][i] + parts[1][i] + parts[2][i]);
+        let (weights, sum) = match sum != 0.0 && sum.is_finite() {
+            true => (parts.map(|part| part[0] / sum), sum),
+            false => ([1.0, 0.0, 0.0], f64::INFINITY),
         };
-        for (shade, sign) in self.shade.iter_mut().zip(sides) {
-            let normal = |v: usize| vertex_normals[v].map(|x| sign * x);
-            let point = |&v: &usize| (self.positions[v], normal(v));
-            let points: Vec<(Vec3, Vec3)> = vertices.iter().map(point).collect();
-            shade.resize(self.positions.len(), Shade::default());
-            for (&v, of) in vertices.iter().zip(self.lights.shade(&points)) {
-                shade[v] = of;
-            }
-        }
-        let floor: Vec<(Vec3, Vec3)> = self.floor.points().collect();
-        self.floor.shade = self.lights.shade(&floor);
-    }
-
-    /// Finds the normals at the corners of what is seen.
-    fn smooth(&mut self) {
-        let connectivity = &self.mesh.connectivity;
-        let normals = face_normals(connectivity, self.positions);
-        self.normals_of = vec![NOTHING; self.faces.len()];
-        for &face in self.seen.iter().flatten() {
-            let place = &mut self.normals_of[face as usize];
-            // A face can be seen in two bands.
-            if *place == NOTHING {
-                *place = self.normals.len() as u32;
-                let f = FaceId::new(face as usize);
-                self.normals.push(corner_normals(connectivity, &normals, f));
-            }
+        let slope =
+            |i: usize, of_sum: f64| [0, 1, 2].map(|k| (parts[k][i] - weights[k] * of_sum) / sum);
+        Spot {
+            face,
+            weights,
+            right: slope(1, right),
+            down: slope(2, down),
         }
     }
-}
 
-/// A direction that shows much of the surface, a unit vector from the scene to the eye.
-pub(super) fn direction(mesh: &Mesh) -> Vec3 {
-    let positions = mesh.positions.as_slice();
-    let faces = mesh.connectivity.to_faces();
-    match stand_in(
-        VIEWED,
-        positions,
-        &vertex_normals(positions, &faces),
-        &faces,
-    ) {
-        Some(few) => choose_direction(&few.positions, &few.faces),
-        None => choose_direction(positions, &faces),
-    }
-}
-
-/// A coarser surface where there are more than so many faces.
-fn stand_in(
-    (least, cells): (usize, u32),
-    positions: &[Vec3],
-    normals: &[Vec3],
-    faces: &[[u32; 3]],
-) -> Option<Coarse> {
-    (faces.len() > least).then(|| coarse(positions, normals, faces, cells))
-}
-
-/// Unit normals of the vertices, weighted by area.
-fn vertex_normals(positions: &[Vec3], faces: &[[u32; 3]]) -> Vec<Vec3> {
-    let mut sums = vec![[0.0; 3]; positions.len()];
-    for face in faces {
-        let [a, b, c] = face.map(|v| positions[v as usize]);
-        let n = cross(sub(b, a), sub(c, a));
-        for &v in face {
-            sums[v as usize] = along(sums[v as usize], 1.0, n);
+    /// Position and unit normal, towards the eye, of a spot.
+    fn point(&self, spot: &Spot) -> Point {
+        let blend = |of: [Vec3; 3]| -> Vec3 {
+            std::array::from_fn(|i| (0..3).map(|k| spot.weights[k] * of[k][i]).sum())
+        };
+        let normal = unit(blend(self.normals[spot.face]));
+        let position = blend(self.faces[spot.face].map(|v| self.positions[v as usize]));
+        match is_behind(&self.on_screen(spot.face)) {
+            true => (position, normal.map(|x| -x)),
+            false => (position, normal),
         }
     }
-    sums.into_iter().map(unit).collect()
+
+    /// Unit normal of a bar at a place of the picture.
+    fn bar_normal(&self, bar: &Mark, at: [f64; 2]) -> Vec3 {
+        let [a, b] = bar.ends.map(|p| [p[0], p[1], 0.0]);
+        let (axis, d) = (sub(b, a), sub([at[0], at[1], 0.0], a));
+        let t = dot(d, axis) / dot(axis, axis).max(f64::MIN_POSITIVE);
+        let [x, y, _] = along(d, -t.clamp(0.0, 1.0), axis).map(|x| x / bar.radius);
+        let z = (1.0 - x * x - y * y).max(0.0).sqrt();
+        self.camera.oriented([x, -y, z])
+    }
+
+    /// Light on a point with this unit normal: from sky and ground, lamp and fill light, and a soft gloss.
+    fn light(&self, normal: Vec3, at: [f64; 2], open: f32, gloss: f32) -> (Linear, f32) {
+        let toward_eye = unit(self.camera.sight(at).map(|x| -x));
+        let upward = 0.5 + 0.5 * normal[1] as f32;
+        let sky = mix([0.35, 0.33, 0.31], [0.52, 0.55, 0.60], upward);
+        let [lamp, fill] = [self.lamp, self.fill].map(|d| dot(normal, d).max(0.0) as f32 * open);
+        let halfway = unit(along(self.lamp, 1.0, toward_eye));
+        let shine = dot(normal, halfway).max(0.0).powi(28) as f32;
+        let rim = (1.0 - dot(normal, toward_eye).max(0.0)).powi(4) as f32;
+        let diffuse = std::array::from_fn(|i| {
+            sky[i] * open + [0.62, 0.585, 0.53][i] * lamp + [0.17, 0.185, 0.21][i] * fill
+        });
+        (diffuse, (gloss * shine + 0.05 * rim) * open)
+    }
+
+    /// A pale studio whose floor takes the shadow.
+    fn background(&self, at: [f64; 2]) -> Linear {
+        let half = 0.5 * self.size as f64;
+        let [x, y] = [(at[0] - half) / half, (at[1] - 0.9 * half) / half];
+        let far = ((x * x + y * y) / (1.45 * 1.45)).min(1.0) as f32;
+        let studio = mix([0.93, 0.935, 0.94], [0.76, 0.78, 0.81], far);
+        let shadow = self.floor.shadow(self.camera.eye, self.camera.sight(at));
+        studio.map(|c| c * (1.0 - 0.55 * shadow))
+    }
 }
 
-/// Unit normal and twice the area of every face.
-fn face_normals(connectivity: &Connectivity, positions: &[Vec3]) -> Vec<(Vec3, f64)> {
-    connectivity
-        .faces()
+/// Unit normals of the corners of all faces: the mean, by area, over the faces at the vertex that meet at a small angle.
+fn corner_normals(mesh: &Mesh) -> Vec<[Vec3; 3]> {
+    let connectivity = &mesh.connectivity;
+    let normals: Vec<(Vec3, f64)> = (connectivity.faces())
         .map(|f| {
-            let [a, b, c] = connectivity.face_vertices(f).map(|v| positions[v.index()]);
+            let [a, b, c] = mesh.face_positions(f);
             let n = cross(sub(b, a), sub(c, a));
             (unit(n), norm(n))
         })
-        .collect()
-}
-
-/// Unit normals of the corners of a face: the mean over the faces at the vertex that meet at a small angle.
-fn corner_normals(connectivity: &Connectivity, normals: &[(Vec3, f64)], f: FaceId) -> [Vec3; 3] {
-    let own = normals[f.index()].0;
-    [0, 1, 2].map(|k| {
-        let v = connectivity.tail(connectivity.corner_halfedge(f, k));
-        let sum = connectivity.outgoing(v).fold([0.0; 3], |sum, h| {
-            let (n, weight) = normals[connectivity.face(h).index()];
-            if dot(n, own) > CREASE {
-                along(sum, weight, n)
-            } else {
-                sum
-            }
-        });
-        unit(sum)
-    })
+        .collect();
+    let of_face = |f: usize| {
+        let own = normals[f].0;
+        [0, 1, 2].map(|k| {
+            let v = connectivity.tail(connectivity.corner_halfedge(FaceId::new(f), k));
+            let around = connectivity
+                .outgoing(v)
+                .map(|h| normals[connectivity.face(h).index()]);
+            let smooth = around.filter(|(n, _)| dot(*n, own) > CREASE);
+            unit(smooth.fold([0.0; 3], |sum, (n, area)| along(sum, area, n)))
+        })
+    };
+    (0..normals.len()).into_par_iter().map(of_face).collect()
 }

@@ -1,6 +1,6 @@
 //! Where to look from: a perspective camera that shows much of the surface.
 
-use super::raster::{Band, NOTHING};
+use super::raster::{Band, NOTHING, SAMPLES};
 use crate::geometry::mesh::{bounding_box, cross, distance, dot, norm, sub};
 use rayon::prelude::*;
 
@@ -23,12 +23,12 @@ pub fn unit(a: Vec3) -> Vec3 {
 pub struct Camera {
     /// Unit vectors in space: right and up on the screen, and from the scene to the eye.
     pub right: Vec3,
-    /// See `right`.
     pub up: Vec3,
-    /// See `right`.
     pub back: Vec3,
     /// Where the eye is.
     pub eye: Vec3,
+    /// Its distance from the middle of the scene.
+    pub depth: f64,
     /// Pixels a unit of (x / depth).
     pub zoom: f64,
     /// Screen position of the axis of view.
@@ -41,23 +41,19 @@ const EYE_DISTANCE: f64 = 6.0;
 const FILL: f64 = 0.82;
 
 impl Camera {
-    /// Looks at the points from `direction` (unit, from the scene to the eye) so that they fill a square picture of `size` pixels.
+    /// Looks at the points from `direction` (from the scene to the eye, not vertical) so that they fill a square picture of `size` pixels.
     pub fn looking_from(direction: Vec3, points: &[Vec3], size: f64) -> Camera {
         let (low, high) = finite_box(points);
         let centre: Vec3 = std::array::from_fn(|i| 0.5 * (low[i] + high[i]));
         let radius = (0.5 * distance(low, high)).max(f64::MIN_POSITIVE);
         let back = unit(direction);
-        let vertical = if back[1].abs() > 0.999 {
-            [0.0, 0.0, -1.0]
-        } else {
-            [0.0, 1.0, 0.0]
-        };
-        let right = unit(cross(vertical, back));
+        let right = unit(cross([0.0, 1.0, 0.0], back));
         let mut camera = Camera {
             right,
             up: cross(back, right),
             back,
             eye: along(centre, EYE_DISTANCE * radius, back),
+            depth: EYE_DISTANCE * radius,
             zoom: 1.0,
             principal: [0.0; 2],
         };
@@ -76,6 +72,12 @@ impl Camera {
                 std::array::from_fn(|i| 0.5 * size - 0.5 * camera.zoom * (low[i] + high[i]));
         }
         camera
+    }
+
+    /// The unit vector with these parts to the right, upwards and towards the eye, of any length.
+    pub fn oriented(&self, [right, up, back]: Vec3) -> Vec3 {
+        let level = along(self.right.map(|x| right * x), up, self.up);
+        unit(along(level, back, self.back))
     }
 
     /// Column, row and closeness (1 / depth) of a point in space.
@@ -109,86 +111,71 @@ pub fn finite_box(points: &[Vec3]) -> (Vec3, Vec3) {
     }
 }
 
-/// Pixels along a side of the trial pictures.
-const TRIAL: usize = 112;
+/// Columns of pixels of the trial pictures, and rows of samples.
+const TRIAL: usize = 48;
+const ROWS: usize = TRIAL * SAMPLES;
 
 /// The direction to look from: of many three-quarter views from above, the one that shows most of the
 /// surface's front, largely, and with its holes open. `y` is up, as in glTF and most OBJ files.
 pub fn choose_direction(positions: &[Vec3], faces: &[[u32; 3]]) -> Vec3 {
-    let mut candidates: Vec<Vec3> = Vec::new();
-    for degrees in [12.0_f64, 22.0, 35.0, 52.0] {
-        let (sine, cosine) = degrees.to_radians().sin_cos();
-        for k in 0..36 {
-            let (x, z) = f64::from(10 * k).to_radians().sin_cos();
-            candidates.push([cosine * x, sine, cosine * z]);
-        }
-    }
-    let scores: Vec<f64> = candidates
-        .par_iter()
-        .map(|&d| score(d, positions, faces))
+    let candidate = |k: usize| {
+        let (sine, cosine) = [16.0_f64, 26.0, 42.0][k % 3].to_radians().sin_cos();
+        let (x, z) = (15.0 * (k / 3) as f64).to_radians().sin_cos();
+        [cosine * x, sine, cosine * z]
+    };
+    let scores: Vec<f64> = (0..72)
+        .into_par_iter()
+        .map(|k| score(candidate(k), positions, faces))
         .collect();
-    let best =
-        (0..candidates.len()).fold(0, |best, k| if scores[k] > scores[best] { k } else { best });
-    candidates[best]
+    candidate((0..72).fold(0, |best, k| if scores[k] > scores[best] { k } else { best }))
 }
 
 /// How good a view is: visible front, size on the picture and open holes against what is dull.
 fn score(direction: Vec3, positions: &[Vec3], faces: &[[u32; 3]]) -> f64 {
     let camera = Camera::looking_from(direction, positions, TRIAL as f64);
-    let screen: Vec<[f64; 3]> = positions.iter().map(|&p| camera.project(p)).collect();
-    let mut band = Band::new(TRIAL, 0, TRIAL);
-    for (f, face) in faces.iter().enumerate() {
-        band.draw(&face.map(|v| screen[v as usize]), f as u32);
-    }
-    let (mut front, mut back) = (0.0, 0.0);
-    let mut open = vec![false; TRIAL * TRIAL];
-    for row in 0..TRIAL {
-        for column in 0..TRIAL {
-            let seen = band.object(column, row);
-            if seen == NOTHING {
-                open[row * TRIAL + column] = true;
-                continue;
-            }
-            let [a, b, c] = faces[seen as usize].map(|v| screen[v as usize]);
-            // Rows run downwards: a counterclockwise face has negative area on the screen.
-            let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-            *(if area < 0.0 { &mut front } else { &mut back }) += 1.0;
-        }
-    }
-    let pixels = (TRIAL * TRIAL) as f64;
-    let holes = holes(open);
-    let hole_area: f64 = holes.iter().map(|&n| n as f64 / pixels).sum();
-    let facing = front / pixels - 1.5 * back / pixels;
+    let screen: Vec<Vec3> = positions.iter().map(|&p| camera.project(p)).collect();
+    let band = Band::of(TRIAL, 0..ROWS, faces, &screen);
+    let seen = (0..TRIAL * ROWS).map(|at| band.seen(at % TRIAL, at / TRIAL).0);
+    let share = |n: usize| n as f64 / (TRIAL * ROWS) as f64;
+    let shown = seen.clone().filter(|&face| face != NOTHING);
+    let corners = |face: u32| faces[face as usize].map(|v| screen[v as usize]);
+    let back = shown
+        .clone()
+        .filter(|&face| is_behind(&corners(face)))
+        .count();
+    let front = share(shown.count() - back);
+    let holes = holes(seen.map(|face| face == NOTHING).collect());
+    let hole_area: f64 = holes.iter().map(|&n| share(n)).sum();
     // A look along an axis is flat, and models face +z.
     let [x, _, z] = direction.map(f64::abs);
     let oblique = 1.0 - 5.0 * (x.max(z) / x.hypot(z) - 0.965).max(0.0);
     let elevation = 1.0 - 0.8 * (direction[1] - 0.36).abs();
-    (facing + 0.06 * holes.len() as f64 + hole_area) * oblique * elevation + 0.02 * direction[2]
+    let shown = front - 1.5 * share(back) + 0.06 * holes.len() as f64 + hole_area;
+    shown * oblique * elevation + 0.02 * direction[2]
+}
+
+/// True where a triangle on the screen shows its back: rows run downwards, so the front has negative area.
+pub fn is_behind([a, b, c]: &[Vec3; 3]) -> bool {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0
 }
 
 /// Sizes of the regions of background that the surface encloses, specks left out.
 fn holes(mut open: Vec<bool>) -> Vec<usize> {
     let mut sizes = Vec::new();
     for start in 0..open.len() {
-        if !std::mem::take(&mut open[start]) {
-            continue;
-        }
         let (mut stack, mut size, mut enclosed) = (vec![start], 0, true);
         while let Some(at) = stack.pop() {
+            if !std::mem::take(&mut open[at]) {
+                continue;
+            }
             size += 1;
             let (column, row) = (at % TRIAL, at / TRIAL);
-            let neighbours = [
-                (column > 0).then(|| at - 1),
-                (column + 1 < TRIAL).then_some(at + 1),
-                (row > 0).then(|| at - TRIAL),
-                (row + 1 < TRIAL).then_some(at + TRIAL),
-            ];
-            enclosed &= neighbours.iter().all(Option::is_some);
-            for next in neighbours.into_iter().flatten() {
-                if std::mem::take(&mut open[next]) {
-                    stack.push(next);
-                }
+            if column == 0 || row == 0 || column + 1 == TRIAL || row + 1 == ROWS {
+                enclosed = false;
             }
+            let before = [1, TRIAL].map(|step| at.saturating_sub(step));
+            let after = [1, TRIAL].map(|step| (at + step).min(open.len() - 1));
+            stack.extend(before.into_iter().chain(after).filter(|&at| open[at]));
         }
         if enclosed && size >= 12 {
             sizes.push(size);
@@ -215,12 +202,12 @@ mod tests {
 
     #[test]
     fn enclosed_background_is_a_hole() {
-        let mut open = vec![true; TRIAL * TRIAL];
+        let mut open = vec![true; TRIAL * ROWS];
         let square = |low: usize, high: usize| {
             (low..high).flat_map(move |y| (low..high).map(move |x| y * TRIAL + x))
         };
-        square(20, 60).for_each(|at| open[at] = false);
-        square(30, 40).for_each(|at| open[at] = true);
+        square(8, 40).for_each(|at| open[at] = false);
+        square(15, 25).for_each(|at| open[at] = true);
         assert_eq!(holes(open), [100]);
     }
 

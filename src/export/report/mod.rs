@@ -17,6 +17,7 @@ use crate::export::atlas_json::{self, Document};
 use crate::export::folder::Staging;
 use crate::export::html::{self, escape, figure, link};
 use crate::export::names;
+use crate::export::pictures::colour::diverging;
 use crate::export::{ExportError, Provenance};
 use crate::flow::ricci::Solver;
 use crate::product::AffineAtlas;
@@ -33,6 +34,7 @@ pub const FILE_NAME: &str = names::REPORT;
 const STYLE: &str = include_str!("report.css");
 const SURFACE: &str = include_str!("surface.js");
 const SCRIPT: &str = include_str!("report.js");
+const VIEWS: &str = include_str!("views.html");
 
 /// What is written of a component for a browser (`[report]`).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -70,46 +72,32 @@ pub fn write(
         "" => FILE_NAME.to_owned(),
         _ => format!("{subfolder}/{FILE_NAME}"),
     };
-    let page =
-        page(atlas, provenance, params).map_err(|error| error.at(&staging.target().join(&path)))?;
+    let encoding = |error: io::Error| ExportError::Encode {
+        path: staging.target().join(&path),
+        message: error.to_string(),
+    };
+    let page = page(atlas, provenance, params, encoding)?;
     staging.write(&path, page.as_bytes())
 }
 
-/// Why a page could not be made.
-enum PageError {
-    Export(ExportError),
-    Pack(io::Error),
-}
-
-impl PageError {
-    fn at(self, path: &std::path::Path) -> ExportError {
-        match self {
-            PageError::Export(error) => error,
-            PageError::Pack(error) => ExportError::Encode {
-                path: path.to_owned(),
-                message: error.to_string(),
-            },
-        }
-    }
-}
-
-/// The text of the page.
+/// The text of the page; `encoding` tells what becomes of an error of packing the surface.
 fn page(
     atlas: &AffineAtlas,
     provenance: &Provenance,
     params: &ReportParams,
-) -> Result<String, PageError> {
-    let document = atlas_json::describe(atlas, provenance).map_err(PageError::Export)?;
+    encoding: impl Fn(io::Error) -> ExportError,
+) -> Result<String, ExportError> {
+    let document = atlas_json::describe(atlas, provenance)?;
     let distortion = face_distortions(&atlas.mesh, &atlas.metric);
     let faces = atlas.mesh.connectivity.face_count();
     let drawing = match faces <= params.max_faces {
-        true => Some(surface::draw(atlas, &distortion).map_err(PageError::Pack)?),
+        true => Some(surface::draw(atlas, &distortion).map_err(encoding)?),
         false => None,
     };
     let mut body = String::new();
     header(&mut body, &document, provenance);
     match &drawing {
-        Some(drawing) => views(&mut body, drawing),
+        Some(drawing) => body.push_str(&views(drawing)),
         None => {
             let _ = write!(
                 body,
@@ -130,8 +118,10 @@ fn page(
         document.metric.curvature_tolerance,
         time,
     );
-    let logs = Histogram::log_scale(distortion.iter().flatten());
-    let angles = Histogram::angle_error(distortion.iter().flatten());
+    let of_faces = || distortion.iter().flatten();
+    let logs = Histogram::new(of_faces().map(|d| (d.log_scale, d.weight)));
+    let of_corners = of_faces().flat_map(|d| d.angle_error.map(|error| (error, d.weight / 3.0)));
+    let angles = Histogram::new(of_corners);
     let quality = &document.quality;
     let _ = write!(
         body,
@@ -185,13 +175,7 @@ fn page(
     }
     let title = format!("{} · affine atlas", provenance.asset);
     let scripts = [html::TABLES, SURFACE, SCRIPT];
-    Ok(html::page(
-        &title,
-        STYLE,
-        &body,
-        &scripts,
-        html::Pictures::Inside,
-    ))
+    Ok(html::page(&title, STYLE, &body, &scripts, html::INSIDE))
 }
 
 fn header(body: &mut String, document: &Document, provenance: &Provenance) {
@@ -203,17 +187,16 @@ fn header(body: &mut String, document: &Document, provenance: &Provenance) {
             provenance.component, provenance.components
         );
     }
-    let cones = document.cones.len();
-    let patches = document.patches.len();
+    let counted = |n: usize, words: [&str; 2]| format!("{n} {}", words[usize::from(n != 1)]);
     let _ = writeln!(
         body,
-        "Made from <code>{}</code> by {} {}: {} faces, {cones} {}, {patches} {}.</p>",
+        "Made from <code>{}</code> by {} {}: {} faces, {}, {}.</p>",
         escape(&document.source.path),
         escape(&document.generator.name),
         escape(&document.generator.version),
         document.topology.faces,
-        if cones == 1 { "cone" } else { "cones" },
-        if patches == 1 { "patch" } else { "patches" },
+        counted(document.cones.len(), ["cone", "cones"]),
+        counted(document.patches.len(), ["patch", "patches"]),
     );
     body.push_str("<p>Files beside this page: ");
     let names = ["atlas.json", "atlas.npz", "surface.glb"];
@@ -221,127 +204,46 @@ fn header(body: &mut String, document: &Document, provenance: &Provenance) {
     let _ = writeln!(body, "{}.</p>", links.join(", "));
 }
 
-/// One view with its buttons.
-fn view(body: &mut String, number: usize, name: &str, title: &str, more: &str, help: &str) {
-    let _ = write!(
-        body,
-        "<figure class=\"view\"><figcaption><strong>{title}</strong>{more}\
-         <span><button type=\"button\" data-view=\"{number}\" data-act=\"in\" aria-label=\"Zoom in\">+</button> \
-         <button type=\"button\" data-view=\"{number}\" data-act=\"out\" aria-label=\"Zoom out\">−</button> \
-         <button type=\"button\" data-view=\"{number}\" data-act=\"reset\">Reset</button></span></figcaption>\n\
-         <canvas id=\"view-{name}\" width=\"600\" height=\"600\" tabindex=\"0\" role=\"img\" aria-label=\"{title}\" aria-describedby=\"read-{name}\"></canvas>\n\
-         <output id=\"read-{name}\" data-empty=\"{help}\">{help}</output></figure>\n"
-    );
-}
-
-fn views(body: &mut String, drawing: &Drawing) {
-    body.push_str("<h2>Surface</h2>\n<form id=\"layers\" aria-label=\"What is shown\"><fieldset><legend>Colours</legend>\n");
-    let layers = [
-        ("board", "Checkerboard"),
-        ("field", "Directions"),
-        ("log-scale", "Log scale"),
-        ("angle-error", "Angle error"),
-        ("distance", "Distance of the images"),
-        ("patches", "Patches"),
-    ];
-    for (value, words) in layers {
-        let (state, hint) = match value {
-            "board" => (" checked", ""),
-            "distance" if drawing.scales.distance.is_none() => (" disabled", " (not measured)"),
-            _ => ("", ""),
-        };
-        let _ = writeln!(
-            body,
-            "<label><input type=\"radio\" name=\"layer\" value=\"{value}\"{state}>{words}{hint}</label>"
-        );
-    }
-    body.push_str("</fieldset><fieldset><legend>Lines and marks</legend>\n");
-    for (name, words, state) in [
-        ("cones", "Cones", " checked"),
-        ("cut", "Cut", " checked"),
-        ("features", "Features", " checked"),
-        ("borders", "Borders of patches", ""),
-        ("edges", "Edges of faces", ""),
-    ] {
-        if name == "features" && !drawing.has_features {
-            continue;
-        }
-        let _ = writeln!(
-            body,
-            "<label><input type=\"checkbox\" name=\"{name}\"{state}>{words}</label>"
-        );
-    }
-    body.push_str("</fieldset></form>\n");
-    legends(body, &drawing.scales);
-    body.push_str("<p id=\"surface-note\" role=\"status\">Unpacking …</p>\n<noscript><p>The views need JavaScript; figures and tables do not.</p></noscript>\n<div class=\"views\">\n");
-    view(
-        body,
-        0,
-        "space",
-        "In space",
-        "",
-        "Drag or use the arrow keys to turn, with Shift to move, + and − to zoom, 0 to begin again; point, tap or press Enter to read a face.",
-    );
-    let choice = "<label><input type=\"radio\" name=\"plane\" value=\"packed\" checked>Patches</label><label><input type=\"radio\" name=\"plane\" value=\"chart\">Central chart</label>";
-    view(
-        body,
-        1,
-        "plane",
-        "In the plane",
-        choice,
-        "Drag or use the arrow keys to move, + and − to zoom, 0 to begin again; point, tap or press Enter to read a face.",
-    );
-    body.push_str("</div>\n<ul class=\"key\">\
-        <li><svg width=\"16\" height=\"16\" aria-hidden=\"true\"><path d=\"M8 2L15 14H1Z\" fill=\"var(--positive)\"/></svg>cone of positive curvature</li>\
-        <li><svg width=\"16\" height=\"16\" aria-hidden=\"true\"><path d=\"M8 1L15 8L8 15L1 8Z\" fill=\"var(--negative)\"/></svg>cone of negative curvature</li>\
-        <li><svg width=\"28\" height=\"10\" aria-hidden=\"true\"><path d=\"M0 5H28\" stroke=\"var(--halo)\" stroke-width=\"6\"/><path d=\"M0 5H28\" stroke=\"var(--cut)\" stroke-width=\"3\"/></svg>cut</li>\
-        <li><svg width=\"28\" height=\"10\" aria-hidden=\"true\"><path d=\"M0 5H28\" stroke=\"var(--halo)\" stroke-width=\"6\"/><path d=\"M0 5H28\" stroke=\"var(--feature)\" stroke-width=\"3\"/></svg>feature that is a line</li>\
-        <li><svg width=\"28\" height=\"10\" aria-hidden=\"true\"><path d=\"M0 5H28\" stroke=\"var(--ink)\" stroke-width=\"3\"/></svg>boundary</li>\
-        <li><svg width=\"28\" height=\"10\" aria-hidden=\"true\"><path d=\"M0 5H28\" stroke=\"var(--border-line)\" stroke-width=\"1.5\"/></svg>border of patches</li></ul>\n");
-}
-
-/// What the colours mean.
-fn legends(body: &mut String, scales: &Scales) {
-    let rgb = |[r, g, b]: [u8; 3]| format!("rgb({r},{g},{b})");
-    let diverging: Vec<String> = (0..7)
-        .map(|i| {
-            rgb(crate::export::pictures::colour::diverging(
-                f64::from(i) / 3.0 - 1.0,
-            ))
-        })
-        .collect();
-    let rising: Vec<String> = RISING.iter().map(|&c| rgb(c)).collect();
-    let [middle, reach] = scales.log_scale;
-    let far = scales.distance.unwrap_or(0.0);
-    body.push_str("<div class=\"legends\">\n<div class=\"legend\" data-legend=\"board\"><span class=\"words\">Squares are squares of the flat metric; where they would be too small or too large to see, sizes change by powers of two.</span></div>\n\
-        <div class=\"legend\" data-legend=\"field\" hidden><span class=\"words\">Lines along both axes of the flat metric. Where all transitions turn by quarter turns they go on across the cut: a cross field, whose singular points are the cones.</span></div>\n");
-    let mut bar = |layer: &str, words: &str, colours: &[String], ends: [f64; 3]| {
-        let [low, mid, high] = ends.map(figure);
-        let _ = writeln!(
-            body,
-            "<div class=\"legend\" data-legend=\"{layer}\" hidden><span class=\"words\">{words}</span><div class=\"bar\" style=\"background:linear-gradient(to right,{})\"></div><span>{low}</span><span>{mid}</span><span>{high}</span></div>",
-            colours.join(",")
-        );
+/// Both views of the surface, what can be shown in them, and what colours and lines mean.
+fn views(drawing: &Drawing) -> String {
+    let Scales {
+        log_scale: [middle, reach],
+        angle_error,
+        distance,
+    } = drawing.scales;
+    let bar = |stops: Vec<[u8; 3]>, ends: [f64; 3]| {
+        let rgb = stops.iter().map(|[r, g, b]| format!("rgb({r},{g},{b})"));
+        let stops = rgb.collect::<Vec<_>>().join(",");
+        let ends = ends.map(|x| format!("<span>{}</span>", figure(x))).concat();
+        format!(
+            "<div class=\"bar\" style=\"background:linear-gradient(to right,{stops})\"></div>{ends}"
+        )
     };
-    bar(
-        "log-scale",
-        "½ ln(flat area / area in space) of a face; hatched where the flat metric shrinks it",
-        &diverging,
-        [middle - reach, middle, middle + reach],
-    );
-    bar(
-        "angle-error",
-        "Largest angle error of a face [rad]",
-        &rising,
-        [0.0, 0.5 * scales.angle_error, scales.angle_error],
-    );
-    bar(
-        "distance",
-        "Distance of the surface from the one rebuilt from the images [source units]",
-        &rising,
-        [0.0, 0.5 * far, far],
-    );
-    body.push_str("<div class=\"legend\" data-legend=\"patches\" hidden><span class=\"words\">One colour a patch, the same in space and in the plane; point at a face for its number.</span></div>\n</div>\n");
+    let both_ways = (0..7)
+        .map(|i| diverging(f64::from(i) / 3.0 - 1.0))
+        .collect();
+    let upward = |most: f64| bar(RISING.to_vec(), [0.0, 0.5 * most, most]);
+    let features = "<label><input type=\"checkbox\" name=\"features\" checked>Features</label>\n";
+    let [state, hint] = match distance {
+        Some(_) => ["", ""],
+        None => [" disabled", " (not measured)"],
+    };
+    let texts = [
+        ("{distance-state}", state.to_owned()),
+        ("{distance-hint}", hint.to_owned()),
+        (
+            "{features}",
+            if drawing.has_features { features } else { "" }.to_owned(),
+        ),
+        (
+            "{log-scale}",
+            bar(both_ways, [middle - reach, middle, middle + reach]),
+        ),
+        ("{angle-error}", upward(angle_error)),
+        ("{distance}", upward(distance.unwrap_or(0.0))),
+    ];
+    let fill = |page: String, (name, text): (&str, String)| page.replace(name, &text);
+    texts.into_iter().fold(VIEWS.to_owned(), fill)
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! Plots of the page: the course of the flow and histograms of distortion, drawn as SVG with every value in words.
 
 use crate::export::html::figure;
+use crate::export::pictures::checkerboard::{ascending, weighted_quantile};
+use crate::export::pictures::convergence::{Course, short, ticks};
 use crate::flow::step::FlowStep;
-use crate::report::FaceDistortion;
 use std::fmt::Write as _;
 
 /// Units of the drawings; text keeps its size on narrow screens because drawings are small.
@@ -12,8 +13,6 @@ const LEFT: f64 = 66.0;
 const RIGHT: f64 = 14.0;
 const TOP: f64 = 14.0;
 const BOTTOM: f64 = 40.0;
-/// Errors below this are rounding; they are drawn at it.
-const FLOOR: f64 = 1e-17;
 /// Points beyond this are not marked one by one.
 const MARKED: usize = 200;
 /// Bars of a histogram.
@@ -66,73 +65,46 @@ fn tick_beside(out: &mut String, y: f64, words: &str) {
 
 /// max |K − K̄| in log scale against flow time, and the bound that was asked for.
 pub(super) fn convergence(history: &[FlowStep], tolerance: f64, time: &str) -> String {
-    let height = |error: f64| error.max(FLOOR).log10();
-    let points: Vec<(&FlowStep, f64)> = (history.iter())
-        .map(|step| (step, height(step.max_error)))
-        .filter(|(step, y)| y.is_finite() && step.flow_time.is_finite())
-        .collect();
-    let goal = height(tolerance);
-    let low = points.iter().map(|p| p.1).fold(goal, f64::min).floor();
-    let high = points
-        .iter()
-        .map(|p| p.1)
-        .fold(goal, f64::max)
-        .ceil()
-        .max(low + 1.0);
-    let last = points.iter().map(|p| p.0.flow_time).fold(0.0, f64::max);
-    let last = if last > 0.0 { last } else { 1.0 };
-    let place = |t: f64, y: f64| {
+    let course = Course::new(history, tolerance);
+    let place = |p: [f64; 2]| {
+        let [x, y] = course.place(p);
         [
-            LEFT + (WIDTH - LEFT - RIGHT) * t / last,
-            TOP + (HEIGHT - TOP - BOTTOM) * (high - y) / (high - low),
+            LEFT + (WIDTH - LEFT - RIGHT) * x,
+            TOP + (HEIGHT - TOP - BOTTOM) * y,
         ]
     };
     let mut out = String::new();
-    let every = ((high - low) / 6.0).ceil().max(1.0);
-    let mut decade = low;
-    while decade <= high {
-        tick_beside(&mut out, place(0.0, decade)[1], &format!("1e{decade:.0}"));
-        decade += every;
+    for decade in ticks([course.low, course.high], 1.0, 7.0) {
+        tick_beside(&mut out, place([0.0, decade])[1], &format!("1e{decade:.0}"));
     }
-    for t in [0.0, 0.5 * last, last] {
-        tick_below(&mut out, place(t, low)[0], &figure_short(t));
+    for t in ticks([0.0, course.last], 0.0, 5.0) {
+        tick_below(&mut out, place([t, 0.0])[0], &short(t));
     }
     axes(&mut out, time, "max |K − K̄| [rad]");
-    let y = place(0.0, goal)[1];
+    let y = place([0.0, course.goal])[1];
     let _ = writeln!(
         out,
         "<path class=\"goal\" d=\"M{LEFT} {y:.1}H{}\"><title>asked for: {} rad</title></path>",
         WIDTH - RIGHT,
         figure(tolerance)
     );
-    let mut path = String::new();
-    for (i, (step, y)) in points.iter().enumerate() {
-        let [x, y] = place(step.flow_time, *y);
+    let (mut path, mut dots) = (String::new(), String::new());
+    for (i, &(step, p)) in course.points.iter().enumerate() {
+        let [x, y] = place(p);
         let _ = write!(path, "{}{x:.1} {y:.1}", if i == 0 { 'M' } else { 'L' });
-    }
-    let _ = writeln!(out, "<path class=\"curve\" d=\"{path}\"/>");
-    if points.len() <= MARKED {
-        for (step, y) in &points {
-            let [x, y] = place(step.flow_time, *y);
+        if course.points.len() <= MARKED {
+            let (number, error) = (step.iteration, figure(step.max_error));
             let _ = writeln!(
-                out,
-                "<circle class=\"dot\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\"><title>step {}: {} rad</title></circle>",
-                step.iteration,
-                figure(step.max_error)
+                dots,
+                "<circle class=\"dot\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\"><title>step {number}: {error} rad</title></circle>"
             );
         }
     }
+    let _ = write!(out, "<path class=\"curve\" d=\"{path}\"/>\n{dots}");
     svg(
         "Largest curvature error against the steps of the flow",
         &out,
     )
-}
-
-fn figure_short(x: f64) -> String {
-    match x.fract() == 0.0 && x.abs() < 1e6 {
-        true => format!("{x:.0}"),
-        false => figure(x),
-    }
 }
 
 /// Shares of the area in bars of equal width.
@@ -146,19 +118,17 @@ pub(super) struct Histogram {
 
 impl Histogram {
     /// Of values with weights.
-    pub fn new(mut values: Vec<(f64, f64)>) -> Histogram {
-        use crate::export::pictures::checkerboard::weighted_quantile;
-        values.retain(|v| v.0.is_finite() && v.1.is_finite());
-        values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    pub fn new(values: impl Iterator<Item = (f64, f64)>) -> Histogram {
+        let values = ascending(values);
         let [low, high] = [BEYOND, 1.0 - BEYOND].map(|share| weighted_quantile(&values, share));
         // All the same: one bar in the middle.
-        let (low, high) = match high - low > 1e-12 * high.abs().max(1e-12) {
-            true => (low, high),
-            false => (
-                low - 0.5e-6_f64.max(low.abs()),
-                high + 0.5e-6_f64.max(low.abs()),
-            ),
+        let is_one = high - low <= 1e-12 * high.abs().max(1e-12);
+        let slack = if is_one {
+            0.5e-6_f64.max(low.abs())
+        } else {
+            0.0
         };
+        let (low, high) = (low - slack, high + slack);
         let mut bars = vec![0.0; BARS];
         let total: f64 = values.iter().map(|v| v.1).sum();
         for (value, weight) in values {
@@ -170,17 +140,6 @@ impl Histogram {
             range: [low, high],
             bars,
         }
-    }
-
-    /// ½ ln of the ratio of areas.
-    pub fn log_scale<'a>(faces: impl Iterator<Item = &'a FaceDistortion>) -> Histogram {
-        Histogram::new(faces.map(|d| (d.log_scale, d.weight)).collect())
-    }
-
-    /// Angle errors of all corners.
-    pub fn angle_error<'a>(faces: impl Iterator<Item = &'a FaceDistortion>) -> Histogram {
-        let corners = faces.flat_map(|d| d.angle_error.map(|error| (error, d.weight / 3.0)));
-        Histogram::new(corners.collect())
     }
 
     /// The bars; `what` names the values, with their unit.
@@ -228,16 +187,14 @@ mod tests {
 
     #[test]
     fn bars_add_up_to_the_whole_area() {
-        let values: Vec<(f64, f64)> = (0..1000)
-            .map(|i| (f64::from(i), 1.0 + f64::from(i % 7)))
-            .collect();
+        let values = (0..1000).map(|i| (f64::from(i), 1.0 + f64::from(i % 7)));
         let histogram = Histogram::new(values);
         assert!((histogram.bars.iter().sum::<f64>() - 1.0).abs() < 1e-12);
         assert!(histogram.bars.iter().all(|&share| share > 0.01));
-        let same = Histogram::new(vec![(0.25, 2.0), (0.25, 1.0), (f64::NAN, 5.0)]);
+        let same = Histogram::new([(0.25, 2.0), (0.25, 1.0), (f64::NAN, 5.0)].into_iter());
         assert_eq!(same.bars.iter().filter(|&&share| share > 0.0).count(), 1);
         assert!(same.range[0] < 0.25 && 0.25 < same.range[1]);
-        let none = Histogram::new(Vec::new());
+        let none = Histogram::new(std::iter::empty());
         assert!(none.bars.iter().all(|&share| share == 0.0));
         assert!(!none.draw("", "").contains("NaN"));
     }

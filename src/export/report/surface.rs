@@ -7,7 +7,9 @@
 //! their range.
 
 use super::pack::Archive;
-use crate::export::pictures::checkerboard::{CELL_RANGE, Checkerboard, excess, weighted_quantile};
+use crate::export::pictures::checkerboard::{
+    CELL_RANGE, Checkerboard, ascending, excess, weighted_quantile,
+};
 use crate::export::pictures::colour::{categorical, diverging};
 use crate::geometry::ids::{FaceId, FaceVec, NONE, VertexId};
 use crate::geometry::mesh::{bounding_box, cross, norm, sub};
@@ -61,7 +63,7 @@ pub(super) fn draw(
     let mut archive = Archive::default();
     let (low, high) = vertices(atlas, &mut archive);
     let (level, board) = board(atlas);
-    archive.integers("level", &quantised(&level.values, level.range, 65_535.0));
+    level.pack("level", level.range, &mut archive);
     let chart = plane(atlas, &board, &mut archive);
     let has_features = lines(atlas, &mut archive);
     normals(atlas, &mut archive);
@@ -124,23 +126,23 @@ impl Ranged {
         let range = if low <= high { [low, high] } else { [0.0; 2] };
         Ranged { values, range }
     }
+
+    /// Adds them to an archive.
+    fn pack(&self, name: &str, range: [f64; 2], archive: &mut Archive) {
+        let place = |&x: &f64| [quantise(x, range, 65_535.0)];
+        archive.integers(name, &self.values.iter().map(place).collect::<Vec<_>>());
+    }
 }
 
 /// The share of the way from low to high, in `steps`.
 fn quantise(x: f64, [low, high]: [f64; 2], steps: f64) -> u32 {
-    let share = if high > low {
-        (x - low) / (high - low)
-    } else {
-        0.0
-    };
+    let share = (x - low)
+        / if high > low {
+            high - low
+        } else {
+            f64::INFINITY
+        };
     (share.clamp(0.0, 1.0) * steps).round() as u32
-}
-
-fn quantised(values: &[f64], range: [f64; 2], steps: f64) -> Vec<[u32; 1]> {
-    values
-        .iter()
-        .map(|&x| [quantise(x, range, steps)])
-        .collect()
 }
 
 fn vertices(atlas: &AffineAtlas, archive: &mut Archive) -> ([f64; 3], [f64; 3]) {
@@ -163,23 +165,18 @@ fn board(atlas: &AffineAtlas) -> (Ranged, FaceVec<[[f32; 2]; 3]>) {
     // The largest cell of each patch, as a power of two.
     let mut step = vec![f64::INFINITY; atlas.patches.patches.len()];
     for f in c.faces() {
-        for v in c.face_vertices(f) {
-            let level = levels.values.get(v.index()).copied().unwrap_or(0.0);
-            if let Some(least) = step.get_mut(patch_of(f)) {
-                *least = least.min(excess(level).floor());
-            }
+        let level = |v: VertexId| levels.values.get(v.index()).copied().unwrap_or(0.0);
+        if let Some(least) = step.get_mut(patch_of(f)) {
+            let steps = c.face_vertices(f).map(|v| excess(level(v)).floor());
+            *least = steps.into_iter().fold(*least, f64::min);
         }
     }
     let mut origins: FxHashMap<usize, [f64; 2]> = FxHashMap::default();
     let unit = board.cell(0.0);
     let places = c.faces().map(|f| {
         let patch = patch_of(f);
-        let largest = board.cell(
-            step.get(patch)
-                .copied()
-                .filter(|s| s.is_finite())
-                .unwrap_or(0.0),
-        );
+        let step = step.get(patch).copied().filter(|s| s.is_finite());
+        let largest = board.cell(step.unwrap_or(0.0));
         let corners = board.corners(f, largest);
         let origin = *origins
             .entry(patch)
@@ -325,33 +322,17 @@ fn distortions(
     archive: &mut Archive,
 ) -> (Scales, [f64; 2], f64) {
     let worst = |d: &FaceDistortion| d.angle_error.into_iter().fold(0.0, f64::max);
-    let by_area = |of: &dyn Fn(&FaceDistortion) -> f64| {
-        let mut rows: Vec<(f64, f64)> = distortion
-            .iter()
-            .flatten()
-            .map(|d| (of(d), d.weight))
-            .collect();
-        rows.retain(|row| row.0.is_finite() && row.1.is_finite());
-        rows.sort_by(|a, b| a.0.total_cmp(&b.0));
-        rows
-    };
-    let logs = by_area(&|d| d.log_scale);
-    let middle = weighted_quantile(&logs, 0.5);
-    let reach = (weighted_quantile(&logs, 1.0 - BEYOND) - middle)
-        .max(middle - weighted_quantile(&logs, BEYOND));
-    let angles = by_area(&worst);
+    let faces = || distortion.iter().flatten();
+    let logs = ascending(faces().map(|d| (d.log_scale, d.weight)));
+    let [low, middle, high] = [BEYOND, 0.5, 1.0 - BEYOND].map(|s| weighted_quantile(&logs, s));
+    let reach = (high - middle).max(middle - low);
+    let angles = ascending(faces().map(|d| (worst(d), d.weight)));
+    let upper = weighted_quantile(&angles, 1.0 - BEYOND);
     let log_scale = Ranged::new(distortion.iter().map(|d| d.map_or(middle, |d| d.log_scale)));
     let angle_error = Ranged::new(distortion.iter().map(|d| d.as_ref().map_or(0.0, worst)));
     let angle_max = angle_error.range[1];
-    let upper = weighted_quantile(&angles, 1.0 - BEYOND);
-    archive.integers(
-        "log_scale",
-        &quantised(&log_scale.values, log_scale.range, 65_535.0),
-    );
-    archive.integers(
-        "angle_error",
-        &quantised(&angle_error.values, [0.0, angle_max], 65_535.0),
-    );
+    log_scale.pack("log_scale", log_scale.range, archive);
+    angle_error.pack("angle_error", [0.0, angle_max], archive);
     let scales = Scales {
         // Differences that are rounding only are no differences.
         log_scale: [middle, if reach > 1e-9 { reach } else { 1.0 }],
@@ -368,12 +349,8 @@ fn distances(atlas: &AffineAtlas, archive: &mut Archive) -> (Option<f64>, f64) {
     };
     let values = Ranged::new(distance.iter().copied());
     let most = values.range[1].max(0.0);
-    archive.integers(
-        "distance",
-        &quantised(&values.values, [0.0, most], 65_535.0),
-    );
-    let mut sorted: Vec<(f64, f64)> = values.values.iter().map(|&x| (x, 1.0)).collect();
-    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    values.pack("distance", [0.0, most], archive);
+    let sorted = ascending(values.values.iter().map(|&x| (x, 1.0)));
     (Some(weighted_quantile(&sorted, 1.0 - BEYOND)), most)
 }
 

@@ -10,76 +10,35 @@ use std::fmt::Write as _;
 /// Changes of repair that are listed one by one.
 const LISTED: usize = 200;
 
-/// Figures: where in `atlas.json`, what they are, and their unit.
-const FIGURES: [(&str, &str, &str); 27] = [
-    ("/topology/vertices", "Vertices", ""),
-    ("/topology/edges", "Edges", ""),
-    ("/topology/faces", "Faces", ""),
-    ("/topology/euler_characteristic", "Euler characteristic", ""),
-    ("/topology/genus", "Genus", ""),
-    ("/topology/boundary_loops", "Boundary loops", ""),
-    ("/metric/iterations", "Steps of the flow", ""),
-    ("/metric/flips", "Edges flipped", ""),
-    (
-        "/metric/max_curvature_error",
-        "Largest curvature error",
-        "rad",
-    ),
-    (
-        "/metric/curvature_tolerance",
-        "Curvature error asked for",
-        "rad",
-    ),
-    ("/quality/area_distortion", "Area distortion (9)", ""),
-    ("/quality/log_scale/min", "Least log scale", ""),
-    ("/quality/log_scale/max", "Greatest log scale", ""),
-    (
-        "/quality/log_scale/std",
-        "Standard deviation of the log scale",
-        "",
-    ),
-    ("/quality/angle_error/mean", "Mean angle error", "rad"),
-    ("/quality/angle_error/max", "Largest angle error", "rad"),
-    (
-        "/quality/conformal_error/rms",
-        "Distance from a conformal map (rms of ln of squared lengths)",
-        "",
-    ),
-    ("/quality/cut_length", "Length of the cut", "source units"),
-    (
-        "/quality/layout_closing_error",
-        "Closing error of the layout",
-        "source units",
-    ),
-    (
-        "/quality/transition_residual",
-        "Residual of transitions",
-        "chart diameters",
-    ),
-    ("/quality/holonomy_error", "Holonomy error", "rad"),
-    ("/quality/cocycle_error", "Cocycle error", "chart diameters"),
-    (
-        "/quality/image_psnr_db",
-        "Surface rebuilt from the images: PSNR",
-        "dB",
-    ),
-    (
-        "/quality/image_hausdorff",
-        "Largest distance of the rebuilt surface",
-        "source units",
-    ),
-    (
-        "/quality/image_normal_error/mean",
-        "Mean angle of its normals",
-        "rad",
-    ),
-    ("/connectivity/splits", "Splits around cones", ""),
-    (
-        "/flags/seamless",
-        "Seamless (all gluings are quarter turns)",
-        "",
-    ),
-];
+/// Figures: where in `atlas.json`, what they are, and their unit, one a line.
+const FIGURES: &str = "\
+/topology/vertices|Vertices|\n\
+/topology/edges|Edges|\n\
+/topology/faces|Faces|\n\
+/topology/euler_characteristic|Euler characteristic|\n\
+/topology/genus|Genus|\n\
+/topology/boundary_loops|Boundary loops|\n\
+/metric/iterations|Steps of the flow|\n\
+/metric/flips|Edges flipped|\n\
+/metric/max_curvature_error|Largest curvature error|rad\n\
+/metric/curvature_tolerance|Curvature error asked for|rad\n\
+/quality/area_distortion|Area distortion (9)|\n\
+/quality/log_scale/min|Least log scale|\n\
+/quality/log_scale/max|Greatest log scale|\n\
+/quality/log_scale/std|Standard deviation of the log scale|\n\
+/quality/angle_error/mean|Mean angle error|rad\n\
+/quality/angle_error/max|Largest angle error|rad\n\
+/quality/conformal_error/rms|Distance from a conformal map (rms of ln of squared lengths)|\n\
+/quality/cut_length|Length of the cut|source units\n\
+/quality/layout_closing_error|Closing error of the layout|source units\n\
+/quality/transition_residual|Residual of transitions|chart diameters\n\
+/quality/holonomy_error|Holonomy error|rad\n\
+/quality/cocycle_error|Cocycle error|chart diameters\n\
+/quality/image_psnr_db|Surface rebuilt from the images: PSNR|dB\n\
+/quality/image_hausdorff|Largest distance of the rebuilt surface|source units\n\
+/quality/image_normal_error/mean|Mean angle of its normals|rad\n\
+/connectivity/splits|Splits around cones|\n\
+/flags/seamless|Seamless (all gluings are quarter turns)|";
 
 /// A cell with a number.
 fn cell(value: f64) -> String {
@@ -101,12 +60,12 @@ fn vertex_of_file(vertex: Option<u32>) -> String {
     }
 }
 
-/// Rows in a table that scrolls by itself; heads with a `#` stand over numbers.
-fn table(id: &str, label: &str, heads: &[&str], rows: &str) -> String {
+/// Rows in a table that scrolls by itself; heads have `|` between them, and those with a `#` stand over numbers.
+fn table(id: &str, label: &str, heads: &str, rows: &str) -> String {
     let mut out = format!(
         "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{label}\"><table id=\"{id}\" data-sortable><thead><tr>"
     );
-    for head in heads {
+    for head in heads.split('|') {
         let _ = match head.strip_prefix('#') {
             Some(words) => write!(out, "<th scope=\"col\" class=\"number\">{words}</th>"),
             None => write!(out, "<th scope=\"col\">{head}</th>"),
@@ -119,7 +78,8 @@ fn table(id: &str, label: &str, heads: &[&str], rows: &str) -> String {
 /// What is in `atlas.json` of these figures.
 pub(super) fn figures(document: &Value) -> String {
     let mut rows = String::new();
-    for (pointer, words, unit) in FIGURES {
+    for line in FIGURES.lines() {
+        let [pointer, words, unit] = [0, 1, 2].map(|k| line.split('|').nth(k).unwrap_or_default());
         let shown = match document.pointer(pointer) {
             Some(Value::Bool(true)) => "yes".to_owned(),
             Some(Value::Bool(false)) => "no".to_owned(),
@@ -142,32 +102,27 @@ pub(super) fn figures(document: &Value) -> String {
     )
 }
 
+fn row(cells: &[String]) -> String {
+    format!("<tr>{}</tr>\n", cells.concat())
+}
+
 /// Cones with their curvature.
 pub(super) fn cones(document: &Document) -> String {
-    let mut rows = String::new();
-    for cone in &document.cones {
-        let sign = if cone.curvature > 0.0 {
-            "▲ positive"
-        } else {
-            "◆ negative"
+    let rows = document.cones.iter().map(|cone| {
+        let sign = match cone.curvature > 0.0 {
+            true => "▲ positive",
+            false => "◆ negative",
         };
-        let _ = writeln!(
-            rows,
-            "<tr>{}{}{}{}<td>{sign}</td></tr>",
+        row(&[
             whole(cone.vertex),
             vertex_of_file(cone.source_vertex),
             number(cone.curvature, &format!("{:.4}π", cone.curvature / PI)),
             cell(cone.curvature),
-        );
-    }
-    let heads = [
-        "#vertex",
-        "#vertex of the file",
-        "#curvature",
-        "#[rad]",
-        "mark",
-    ];
-    table("cones", "Cones", &heads, &rows)
+            format!("<td>{sign}</td>"),
+        ])
+    });
+    let heads = "#vertex|#vertex of the file|#curvature|#[rad]|mark";
+    table("cones", "Cones", heads, &rows.collect::<String>())
 }
 
 fn motion(m: &Motion) -> String {
@@ -175,98 +130,68 @@ fn motion(m: &Motion) -> String {
         Some(n) => whole(usize::from(n)),
         None => "<td class=\"number\" data-value=\"\">–</td>".to_owned(),
     };
-    format!(
-        "{}{quarters}{}{}{}",
-        cell(m.rotation),
-        cell(m.translation[0]),
-        cell(m.translation[1]),
-        cell(m.residual)
-    )
+    let [x, y] = m.translation.map(cell);
+    [cell(m.rotation), quarters, x, y, cell(m.residual)].concat()
 }
 
 /// Transitions between charts.
 pub(super) fn transitions(document: &Document) -> String {
-    let mut rows = String::new();
-    for t in &document.transitions {
-        let kind = document
-            .charts
-            .get(t.to as usize)
-            .map(|chart| match chart.domain {
-                ChartDomain::Central => "central".to_owned(),
-                ChartDomain::Boundary { segment } => format!("boundary, segment {segment}"),
-                ChartDomain::Node { vertex } => format!("node, vertex {vertex}"),
-            });
-        let _ = writeln!(
-            rows,
-            "<tr>{}{}<td>{}</td>{}{}{}</tr>",
+    let rows = document.transitions.iter().map(|t| {
+        let chart = document.charts.get(t.to as usize);
+        let kind = match chart.map(|chart| &chart.domain) {
+            Some(ChartDomain::Central) => "central".to_owned(),
+            Some(ChartDomain::Boundary { segment }) => format!("boundary, segment {segment}"),
+            Some(ChartDomain::Node { vertex }) => format!("node, vertex {vertex}"),
+            None => String::new(),
+        };
+        row(&[
             whole(t.from as usize),
             whole(t.to as usize),
-            kind.unwrap_or_default(),
+            format!("<td>{kind}</td>"),
             whole(usize::from(t.sector)),
             motion(&t.motion),
-            whole(t.faces)
-        );
-    }
-    let heads = [
-        "#from",
-        "#to",
-        "kind",
-        "#sector",
-        "#rotation [rad]",
-        "#quarters",
-        "#x",
-        "#y",
-        "#residual",
-        "#faces",
-    ];
-    table("transitions", "Transitions", &heads, &rows)
+            whole(t.faces),
+        ])
+    });
+    let heads = "#from|#to|kind|#sector|#rotation [rad]|#quarters|#x|#y|#residual|#faces";
+    table(
+        "transitions",
+        "Transitions",
+        heads,
+        &rows.collect::<String>(),
+    )
 }
 
 /// Segments of the cut with their gluings.
 pub(super) fn segments(document: &Document) -> String {
-    let mut rows = String::new();
-    for s in &document.segments {
-        let _ = writeln!(
-            rows,
-            "<tr>{}{}{}{}{}</tr>",
-            whole(s.id),
-            whole(s.from as usize),
-            whole(s.to as usize),
-            whole(s.vertices.len().saturating_sub(1)),
-            motion(&s.gluing)
-        );
-    }
-    let heads = [
-        "#segment",
-        "#from vertex",
-        "#to vertex",
-        "#edges",
-        "#rotation [rad]",
-        "#quarters",
-        "#x",
-        "#y",
-        "#residual",
-    ];
-    table("segments", "Segments of the cut", &heads, &rows)
+    let rows = document.segments.iter().map(|s| {
+        let ends = [s.from, s.to].map(|v| whole(v as usize)).concat();
+        let edges = whole(s.vertices.len().saturating_sub(1));
+        row(&[whole(s.id), ends, edges, motion(&s.gluing)])
+    });
+    let heads = "#segment|#from vertex|#to vertex|#edges|#rotation [rad]|#quarters|#x|#y|#residual";
+    table(
+        "segments",
+        "Segments of the cut",
+        heads,
+        &rows.collect::<String>(),
+    )
 }
 
 /// Patches with their images.
 pub(super) fn patches(document: &Document, faces: &[usize]) -> String {
-    let mut rows = String::new();
-    for patch in &document.patches {
-        let _ = writeln!(
-            rows,
-            "<tr>{}{}{}{}<td><a href=\"{}\">{}</a></td></tr>",
+    let rows = document.patches.iter().map(|patch| {
+        let (to, name) = (link(&patch.image), escape(&patch.image));
+        row(&[
             whole(patch.id),
             whole(faces.get(patch.id).copied().unwrap_or(0)),
             whole(patch.width),
             whole(patch.height),
-            link(&patch.image),
-            escape(&patch.image)
-        );
-    }
-    let heads = ["#patch", "#faces", "#columns", "#rows", "image"];
-    table("patches", "Patches", &heads, &rows)
+            format!("<td><a href=\"{to}\">{name}</a></td>"),
+        ])
+    });
+    let heads = "#patch|#faces|#columns|#rows|image";
+    table("patches", "Patches", heads, &rows.collect::<String>())
 }
 
 /// What repair changed: counts, then change by change.
@@ -307,25 +232,22 @@ pub(super) fn repair(document: &Document, log: &RepairLog) -> String {
 
 /// The steps of the flow in numbers.
 pub(super) fn history(document: &Document) -> String {
-    let mut rows = String::new();
-    for step in &document.metric.history {
-        let _ = writeln!(
-            rows,
-            "<tr>{}{}{}{}{}</tr>",
+    let rows = document.metric.history.iter().map(|step| {
+        let [error, energy, length] = [step.max_error, step.energy, step.step].map(cell);
+        row(&[
             whole(step.iteration),
-            cell(step.max_error),
-            cell(step.energy),
-            cell(step.step),
-            whole(step.flips)
-        );
-    }
-    let heads = [
-        "#step",
-        "#max error [rad]",
-        "#energy",
-        "#step length",
-        "#flips",
-    ];
-    let table = table("history", "Steps of the flow", &heads, &rows);
+            error,
+            energy,
+            length,
+            whole(step.flips),
+        ])
+    });
+    let heads = "#step|#max error [rad]|#energy|#step length|#flips";
+    let table = table(
+        "history",
+        "Steps of the flow",
+        heads,
+        &rows.collect::<String>(),
+    );
     format!("<details><summary>In numbers</summary>{table}</details>\n")
 }

@@ -4,10 +4,7 @@ use crate::geometry::mesh::Appearance;
 use serde_json::Value;
 
 fn text_of(atlas: &AffineAtlas, provenance: &Provenance, params: &ReportParams) -> String {
-    match page(atlas, provenance, params) {
-        Ok(text) => text,
-        Err(error) => panic!("{}", error.at(std::path::Path::new("report.html"))),
-    }
+    page(atlas, provenance, params, |error| panic!("{error}")).unwrap()
 }
 
 /// Attributes of the elements that have `data-key`.

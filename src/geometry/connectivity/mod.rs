@@ -29,7 +29,6 @@ pub use edit::{EdgeSplit, FaceSplit, Flip, HalvedFace};
 use crate::geometry::ids::{
     EdgeId, EdgeVec, FaceId, HalfedgeId, HalfedgeVec, NONE, VertexId, VertexVec,
 };
-use std::collections::HashMap;
 
 /// Oriented triangulated surface; see the module docs.
 #[derive(Clone, Debug, PartialEq)]
@@ -117,7 +116,8 @@ impl Connectivity {
         vertex_count: usize,
     ) -> Result<Connectivity, ConnectivityError> {
         let mut tail: HalfedgeVec<VertexId> = HalfedgeVec::default();
-        let mut by_ends: HashMap<(u32, u32), u32> = HashMap::with_capacity(3 * faces.len());
+        // Where the halfedges out of each vertex begin.
+        let mut start = vec![0; vertex_count + 1];
         for (f, face) in faces.iter().enumerate() {
             for k in 0..3 {
                 let (a, b) = (face[k], face[(k + 1) % 3]);
@@ -131,24 +131,47 @@ impl Connectivity {
                 if a == b {
                     return Err(ConnectivityError::DegenerateFace { face: f, vertex: a });
                 }
-                if let Some(first) = by_ends.insert((a, b), (3 * f + k) as u32) {
-                    return Err(ConnectivityError::DoubledHalfedge {
-                        first: first as usize / 3,
-                        second: f,
-                        tail: a,
-                        head: b,
-                    });
-                }
+                start[a as usize + 1] += 1;
                 tail.push(VertexId::new(a as usize));
             }
         }
-        let twin = (0..3 * faces.len())
-            .map(|h| {
-                let face = faces[h / 3];
-                let ends = (face[(h % 3 + 1) % 3], face[h % 3]);
-                by_ends.get(&ends).map(|&t| HalfedgeId::new(t as usize))
-            })
-            .collect::<Vec<_>>();
+        for v in 0..vertex_count {
+            start[v + 1] += start[v];
+        }
+        let head = |h: usize| faces[h / 3][(h % 3 + 1) % 3];
+        let (mut end, mut outgoing) = (start.clone(), vec![(0, 0); tail.len()]);
+        for (h, &a) in tail.as_slice().iter().enumerate() {
+            outgoing[end[a.index()]] = (head(h), h);
+            end[a.index()] += 1;
+        }
+        for v in 0..vertex_count {
+            outgoing[start[v]..start[v + 1]].sort_unstable();
+        }
+        let of_one = |p: &&[(u32, usize)]| {
+            p[0].0 == p[1].0 && faces[p[0].1 / 3][p[0].1 % 3] == faces[p[1].1 / 3][p[1].1 % 3]
+        };
+        let pairs = outgoing.windows(2).filter(of_one);
+        let doubled = pairs
+            .map(|pair| [pair[0].1, pair[1].1])
+            .min_by_key(|pair| pair[1]);
+        if let Some([first, second]) = doubled {
+            return Err(ConnectivityError::DoubledHalfedge {
+                first: first / 3,
+                second: second / 3,
+                tail: faces[second / 3][second % 3],
+                head: head(second),
+            });
+        }
+        let twin = |h: usize| {
+            let to = head(h) as usize;
+            let outgoing = &outgoing[start[to]..start[to + 1]];
+            let from = faces[h / 3][h % 3];
+            let at = outgoing
+                .binary_search_by_key(&from, |&(head, _)| head)
+                .ok()?;
+            Some(HalfedgeId::new(outgoing[at].1))
+        };
+        let twin: Vec<_> = (0..tail.len()).map(twin).collect();
         Self::from_gluing(tail, &twin, vertex_count)
     }
 

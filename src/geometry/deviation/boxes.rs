@@ -123,9 +123,11 @@ fn divide(
     nodes: &mut Vec<Node>,
     turned: &mut Vec<TurnedBox>,
 ) -> f64 {
-    let (low, high) = bounding_box(triangles.as_flattened());
     let at = nodes.len();
     let is_leaf = triangles.len() <= LEAF;
+    // That of a node with children follows from theirs.
+    let around = &triangles[..if is_leaf { triangles.len() } else { 1 }];
+    let (low, high) = bounding_box(around.as_flattened());
     nodes.push(Node {
         low,
         high,
@@ -157,6 +159,10 @@ fn divide(
     let longest = divide(left, first, nodes, turned);
     nodes[at].at = nodes.len() as u32;
     let longest = longest.max(divide(right, first + half, nodes, turned));
+    let [a, b] = [&nodes[at + 1], &nodes[nodes[at].at as usize]];
+    let low = [0, 1, 2].map(|i| a.low[i].min(b.low[i]));
+    let high = [0, 1, 2].map(|i| a.high[i].max(b.high[i]));
+    (nodes[at].low, nodes[at].high) = (low, high);
     let diagonal = sub(high, low);
     if triangles.len() > MANY.0 && longest > MANY.1 * MANY.1 * dot(diagonal, diagonal) {
         nodes[at].turned = turned.len() as u32;

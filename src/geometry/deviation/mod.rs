@@ -71,17 +71,29 @@ struct OneSided {
 
 /// Measures two surfaces against each other; `None` where one has no area.
 pub fn deviation(a: Triangles<'_>, b: Triangles<'_>, sampling: Sampling) -> Option<Deviation> {
+    deviation_and_distances(a, b, sampling, &[]).map(|found| found.0)
+}
+
+/// The same, and the distance of each point from the surface `b`.
+pub fn deviation_and_distances(
+    a: Triangles<'_>,
+    b: Triangles<'_>,
+    sampling: Sampling,
+    points: &[[f64; 3]],
+) -> Option<(Deviation, Vec<f64>)> {
     let (tree_a, tree_b) = rayon::join(|| BoxTree::new(a), || BoxTree::new(b));
-    let (area_a, from_a) = one_sided(a, &tree_b?, sampling)?;
+    let tree_b = tree_b?;
+    let (area_a, from_a) = one_sided(a, &tree_b, sampling)?;
     let (area_b, from_b) = one_sided(b, &tree_a?, sampling)?;
     let n = sampling.samples.max(1) as f64;
     let mean = |x: f64, y: f64| (area_a * x / n + area_b * y / n) / (area_a + area_b);
-    Some(Deviation {
+    let found = Deviation {
         rms: mean(from_a.squares, from_b.squares).sqrt(),
         hausdorff: from_a.farthest.max(from_b.farthest),
         mean_normal_angle: mean(from_a.angles, from_b.angles),
         max_normal_angle: from_a.largest_angle.max(from_b.largest_angle),
-    })
+    };
+    Some((found, from_tree(points, &tree_b)))
 }
 
 /// Area of a surface, and its samples against another.

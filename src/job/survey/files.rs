@@ -292,7 +292,10 @@ fn draw(
         .map(|(row, figures)| panel(survey, row, figures))
         .collect();
     panels.extend((built.iter()).map(|&(row, figures)| panel(survey, row, figures)));
-    save("cones", gallery.overview(&panels))
+    save(
+        "cones",
+        Gallery::new(&surface.mesh, size * 3 / 8).row(&panels),
+    )
 }
 
 fn panel<'a>(survey: &Survey, row: &Row, figures: &'a Figures) -> Panel<'a> {
