@@ -17,7 +17,6 @@ use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::linalg::solvers::Solve;
 use faer::perm::PermRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
@@ -45,19 +44,6 @@ pub enum SolveError {
         /// Number of unknowns.
         unknowns: usize,
     },
-}
-
-/// Solves a small dense system with pivoting: `matrix` column by column, as many rows as `rhs` has values. `None` where it is
-/// singular to working precision.
-pub fn solve_dense(matrix: &[f64], rhs: &[f64]) -> Option<Vec<f64>> {
-    let size = rhs.len();
-    if matrix.len() != size * size {
-        return None;
-    }
-    let mut solution = rhs.to_vec();
-    let factor = MatRef::from_column_major_slice(matrix, size, size).partial_piv_lu();
-    factor.solve_in_place(MatMut::from_column_major_slice_mut(&mut solution, size, 1));
-    solution.iter().all(|x| x.is_finite()).then_some(solution)
 }
 
 /// The inner products of some vectors with some others, all of one length and one after another in `a` and `b`: for each of `counts[0]` in `a` those with the

@@ -6,13 +6,10 @@
 //! division that lowers their sum lets all images together hold the surface better with as many texels: where the error falls with the square of their number,
 //! the cube of the sum is what it comes to. So each division gains a number of decibels, and the best is made first, until none gains enough.
 //!
-//! Parts of two patches may lie well in one image where the whole ones overlapped, so neighbours are united (`unite`) afterwards while that saves anything.
-//!
 //! Divisions that are tried: along creases, by straight lines, and between less scale and more. Parts of what is injective and within the range of scale are so too; each is
 //! kept a disk. *Not guaranteed:* the best of all divisions.
 
 mod candidates;
-mod unite;
 
 use super::bend::Bends;
 use super::demand::{self, Budget, Demand, Sums};
@@ -24,7 +21,6 @@ use super::rectangle::smallest;
 use super::resolution::{coarsest, enough_long_side, shape};
 use super::sets::{Sets, in_order};
 use super::slit::Slit;
-use super::teeth::trim;
 use crate::atlas::plane::wrap_angle;
 use crate::geometry::ids::{FaceId, FaceVec};
 use rayon::prelude::*;
@@ -97,13 +93,6 @@ impl<'a> Divider<'a> {
         }
     }
 
-    /// Divides patches, unites parts again, and takes teeth off their borders; see the module docs. A patch may span this range of log scale.
-    pub fn divide(&mut self, patches: Vec<Vec<FaceId>>, range: f64) -> Vec<Vec<FaceId>> {
-        let patches = self.in_divisions(patches);
-        let patches = self.unite(patches, range);
-        in_order(trim(self.slit, patches, &self.bends.is_crease, range))
-    }
-
     /// Areas and bend of patches.
     pub fn sums(&self, patches: &[Vec<FaceId>]) -> Vec<Sums> {
         let of = |sets: &mut Sets<'a>, faces: &Vec<FaceId>| self.sums_and_border(faces, sets).0;
@@ -129,11 +118,10 @@ impl<'a> Divider<'a> {
         demands.iter().map(|d| self.cost(d)).sum()
     }
 
-    /// Makes divisions as long as one gains enough.
+    /// Divides patches as long as one gains enough.
     ///
-    /// What one gains grows while others lower the sum, so that in whichever order they are made they are the same ones, unless
-    /// there is no room for all: then the best comes first.
-    fn in_divisions(&mut self, patches: Vec<Vec<FaceId>>) -> Vec<Vec<FaceId>> {
+    /// What one gains grows while others lower the sum, so that in whichever order they are made they are the same ones, unless there is no room for all: then the best comes first.
+    pub fn divide(&mut self, patches: Vec<Vec<FaceId>>) -> Vec<Vec<FaceId>> {
         let mut sum = self.appraise(&patches);
         let mut rows = self.best_divisions(patches);
         loop {
@@ -152,7 +140,7 @@ impl<'a> Divider<'a> {
                 now = now.into_iter().max_by_key(key).into_iter().collect();
             }
             if now.is_empty() {
-                return rows.into_iter().map(|row| row.faces).collect();
+                return in_order(rows.into_iter().map(|row| row.faces).collect());
             }
             let mut parts = Vec::new();
             for i in now.into_iter().rev() {

@@ -19,7 +19,6 @@ mod bend;
 mod borders;
 mod coverage;
 mod demand;
-mod dissolve;
 mod divide;
 mod given;
 mod holes;
@@ -35,7 +34,6 @@ mod seams;
 mod segment;
 mod sets;
 mod slit;
-mod teeth;
 
 #[cfg(test)]
 pub(crate) mod samples;
@@ -97,9 +95,9 @@ pub fn layout(
         }
     }
     let slit = Slit::new(mesh, length, cut, development, under);
-    let (sets, range) = segment_into(&slit, params);
+    let sets = segment_into(&slit, params);
     let mut divider = Divider::new(&slit, params);
-    let sets = divider.divide(sets, range);
+    let sets = divider.divide(sets);
     let mut face_patch = FaceVec::filled(PatchId::new(0), c.face_count());
     let mut uv = FaceVec::filled([[0.0; 2]; 3], c.face_count());
     for (i, faces) in sets.iter().enumerate() {
@@ -165,8 +163,8 @@ fn rasters_by_bend(
     resolution::adapted(oriented, &even, &bends, params)
 }
 
-/// The patches' faces: at most `max_count`, as far as the range of scale decides about that; and that range.
-fn segment_into(slit: &Slit, params: &PatchParams) -> (Vec<Vec<FaceId>>, f64) {
+/// The patches' faces: at most `max_count`, as far as the range of scale decides about that.
+fn segment_into(slit: &Slit, params: &PatchParams) -> Vec<Vec<FaceId>> {
     let mut range = params.log_scale_range;
     let mut sets = segment::segment(slit, range);
     while params.max_count.is_some_and(|most| sets.len() > most) && range < WIDEST_RANGE {
@@ -176,5 +174,5 @@ fn segment_into(slit: &Slit, params: &PatchParams) -> (Vec<Vec<FaceId>>, f64) {
             sets = fewer;
         }
     }
-    (sets, range)
+    sets
 }

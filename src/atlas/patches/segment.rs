@@ -7,14 +7,12 @@
 //! 3. What was grown around faces of another scale has holes: split it by a straight line through
 //!    the largest hole, until there is none. (The sheet itself makes no holes: an immersed disk whose
 //!    border is a simple curve is embedded, so what a patch surrounds in the plane belongs to it.)
-//! 4. Merge neighbours while all three conditions hold, smallest first (`merge`); divide small patches
-//!    among their neighbours where none can take them whole; see `dissolve`.
+//! 4. Merge neighbours while all three conditions hold, smallest first (`merge`).
 //!
 //! Everything that is compared is rounded first and ties go to the lower id, so that a change in the
 //! last digits of the metric does not change the patches.
 
 use super::coverage::Coverage;
-use super::dissolve::dissolve;
 use super::holes::split_at_holes;
 use super::merge::merge;
 use super::overlap::Triangle;
@@ -28,9 +26,6 @@ use std::collections::BinaryHeap;
 /// Patches are grown in a window of this part of the allowed range. What is left of it lets them take in the
 /// crumbs at the window's border afterwards, where single faces lie just outside.
 const GROWTH: f64 = 0.9;
-
-/// Rounds of merging and dividing: each can make the other possible again, hardly ever often.
-const ROUNDS: usize = 3;
 
 /// Divides the slit disk; every face is in exactly one set. `range` bounds the regional log scale of each.
 pub(super) fn segment(slit: &Slit, range: f64) -> Vec<Vec<FaceId>> {
@@ -80,17 +75,7 @@ pub(super) fn segment(slit: &Slit, range: f64) -> Vec<Vec<FaceId>> {
         enqueue(&mut queue, sets.components(&rest));
     }
     patches.sort_by_key(|p| p.iter().copied().min());
-    for round in 0..ROUNDS {
-        let count = patches.len();
-        patches = merge(slit, patches, range, &mut own);
-        if round > 0 && patches.len() == count {
-            break;
-        }
-        patches = dissolve(slit, patches, range, &mut own);
-        if patches.len() == count {
-            break;
-        }
-    }
+    let patches = merge(slit, patches, range, &mut own);
     // A small flat image costs less than the ragged border that a crumb leaves in its neighbours.
     in_order(patches)
 }

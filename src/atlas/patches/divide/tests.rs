@@ -1,5 +1,4 @@
 use super::super::samples::{Sample, ramp, strip};
-use super::super::slit::Slit;
 use super::super::{PatchLayout, PatchParams, layout};
 use crate::atlas::geometry_image::{image_origin, sample};
 use crate::geometry::deviation::{Sampling, Triangles, deviation};
@@ -68,25 +67,4 @@ fn parts_hold_the_surface_better_with_as_many_texels() {
     assert!(one.0 < two.0, "{one:?} {two:?}");
     assert!(two.1 <= 1.05 * one.1, "{one:?} {two:?}");
     assert!(two.2 < 0.8 * one.2, "{one:?} {two:?}");
-}
-
-/// Two halves of a bent sheet fill one image as well as two, with half as many texels around them.
-#[test]
-fn halves_that_share_a_whole_side_are_united() {
-    let bent = |s: f64, t: f64| [s.sin(), t, s.cos()];
-    let s = strip(20, 20, bent, |s, t| [s, t], [0.0; 2]);
-    let slit = Slit::new(&s.mesh, &s.length, &s.cut, &s.development, None);
-    let params = PatchParams {
-        texel_budget: 64 * 64,
-        padding: 6,
-        ..PatchParams::default()
-    };
-    let faces = s.mesh.connectivity.faces();
-    let is_low = |f: &_| s.mesh.face_positions(*f).iter().map(|p| p[1]).sum::<f64>() < 1.5;
-    let (low, high): (Vec<_>, Vec<_>) = faces.partition(is_low);
-    assert!(!low.is_empty() && !high.is_empty());
-    let mut divider = super::Divider::new(&slit, &params);
-    let united = divider.unite(vec![low, high], 1.0);
-    assert_eq!(united.len(), 1);
-    assert_eq!(united[0].len(), s.mesh.connectivity.face_count());
 }
