@@ -20,6 +20,9 @@ const GOAL: f64 = 1e-3;
 /// Vertices inside that lie beside a line by less than this part of their distance from its last vertex are moved onto it, where that does no harm.
 const BESIDE: f64 = 0.05;
 
+/// The same for those farther aside, where the line crosses the edge opposite by less than this part of it from them.
+const NARROW: f64 = 1e-3;
+
 /// Part of its thickness that a thin face keeps at least where a corner is moved.
 const KEPT: f64 = 0.1;
 
@@ -36,6 +39,8 @@ pub(crate) struct Sheet {
     pub line: EdgeVec<u32>,
     /// A line goes through vertices that lie beside it by less than this part of their distance from its last vertex.
     near: f64,
+    /// Whether bearings around vertices that stay are counted from where their first halfedges went before anything was drawn: then these keep their directions.
+    has_bearings: bool,
 }
 
 /// A place to go to, seen from a corner.
@@ -76,11 +81,13 @@ impl Sheet {
             turns,
             line,
             near,
+            has_bearings: true,
         }
     }
 
-    /// Forgets all lines.
+    /// Forgets all lines. Bearings follow first halfedges from now on.
     pub fn clear(&mut self) {
+        self.has_bearings = false;
         self.line = EdgeVec::filled(NONE, self.fine.connectivity.edge_count());
     }
 
@@ -248,13 +255,13 @@ impl Sheet {
             let (v, edge) = (c.tail(end), minus(self.at(end), p));
             let off = cross(edge, d).abs() / (length(edge) * length(d));
             let along = dot(edge, d) / dot(d, d);
-            if off > BESIDE || along <= 0.0 || along >= 1.0 - GOAL {
+            let is_beside = off <= BESIDE || self.crossed(aim.corner, d, h == aim.corner) < NARROW;
+            if !is_beside || along <= 0.0 || along >= 1.0 - GOAL {
                 continue;
             }
-            // Bearings around a vertex that stays are counted from its first halfedge.
             let is_first = |h: HalfedgeId| {
                 let u = c.head(h);
-                !may_move(u) && c.head(c.vertex_halfedge(u)) == v
+                self.has_bearings && !may_move(u) && c.head(c.vertex_halfedge(u)) == v
             };
             let is_kept = goal == Some(v)
                 || !may_move(v)
@@ -268,6 +275,16 @@ impl Sheet {
             }
         }
         best.map(|(_, h)| h)
+    }
+
+    /// The part of the edge opposite a corner at which a direction d from there crosses it, from its end on the right or on the left.
+    fn crossed(&self, corner: HalfedgeId, d: [f64; 2], from_right: bool) -> f64 {
+        let opposite = self.fine.connectivity.next(corner);
+        let ends = [opposite, self.fine.connectivity.next(opposite)];
+        let [a, b] = ends.map(|h| minus(self.at(h), self.at(corner)));
+        let (right, left) = (cross(a, d), cross(d, b));
+        let part = right / (right + left);
+        if from_right { part } else { 1.0 - part }
     }
 
     /// Draws a straight line to where `aims` say, seen from some corners of one vertex. The vertex where it ends: `goal`, if there is one already. Vertices that `may_move` are moved
