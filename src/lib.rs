@@ -71,7 +71,6 @@ pub mod atlas;
 pub mod batch;
 pub mod config;
 pub mod export;
-pub mod fit;
 pub mod flow;
 pub mod geometry;
 pub mod grid;
@@ -84,6 +83,7 @@ pub mod rebuild;
 pub mod repair;
 pub mod report;
 pub mod schema;
+pub mod spline;
 pub mod texture;
 pub mod verify;
 

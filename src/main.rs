@@ -15,7 +15,6 @@ use affine_atlas::config::assets::Asset;
 use affine_atlas::export::folder::remove_all_staging;
 use affine_atlas::export::manifest::Manifest;
 use affine_atlas::export::{ExportError, index};
-use affine_atlas::job::fit::FitParams;
 use affine_atlas::job::rebuild::RebuildAssetError;
 use affine_atlas::job::survey::folder_name as survey_folder;
 use affine_atlas::job::{self, BuildError};
@@ -188,16 +187,13 @@ fn rebuild(request: &RebuildRequest) -> Result<RebuildResult, Failure> {
 }
 
 fn fit(request: &FitRequest) -> Result<FitResult, Failure> {
-    let params = FitParams {
-        spacing: request.spacing,
-        against: request.against.clone(),
-    };
-    let fitted = job::fit::fit(&request.folder, &params).map_err(|error| Failure::from(&error))?;
+    let fitted = job::fit::fit(&request.input, &request.params);
+    let fitted = fitted.map_err(|error| Failure::from(&error))?;
     let written = fitted.write(&request.root, &request.name);
     written.map_err(|error| Failure::from(&error))?;
     Ok(FitResult {
         text: fitted.to_string(),
-        json: fitted.json(),
+        json: serde_json::json!(fitted.document()),
     })
 }
 

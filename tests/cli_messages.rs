@@ -423,21 +423,17 @@ fn rebuild_without_a_folder_or_a_glb() {
 }
 
 #[test]
-fn fit_without_a_folder_or_a_name() {
+fn fit_without_a_mesh_or_a_name() {
     let folder = folder();
-    insta::assert_snapshot!(refusal(folder.path(), &["fit", "nowhere"], 2), @r"
-    error: there is no folder nowhere
-    help: name a folder that `affine-atlas build` wrote
-    ");
+    insta::assert_snapshot!(refusal(folder.path(), &["fit", "nowhere.obj"], 1), @"");
     insta::assert_snapshot!(refusal(folder.path(), &["fit", ".", "-o", ".."], 2), @r"
     error: .. does not end in the name of a folder to write
     help: name it with `--out FOLDER`
     ");
-    insta::assert_snapshot!(refusal(folder.path(), &["fit", ".", "--spacing", "1.5"], 2), @r"
-    error: invalid value '1.5' for '--spacing <STEPS>': it must be a number from 2 on
-
-    For more information, try '--help'.
-    ");
+    insta::assert_snapshot!(refusal(folder.path(), &["fit", ".", "--tolerance", "1.5"], 2), @"");
+    insta::assert_snapshot!(refusal(folder.path(), &["fit", ".", "--angle", "0"], 2), @"");
+    insta::assert_snapshot!(refusal(folder.path(), &["fit", ".", "--unit", "furlong"], 2), @"");
+    insta::assert_snapshot!(refusal(folder.path(), &["fit", ".", "--cells", "500"], 1), @"");
     std::fs::create_dir(folder.path().join("empty")).expect("created");
     insta::assert_snapshot!(refusal(folder.path(), &["fit", "empty"], 1), @"failed: empty (input): empty holds no atlas.json and no component-000; give the folder that `affine-atlas build` wrote for a mesh");
 }
@@ -500,7 +496,7 @@ fn wrong_arguments_exit_with_2_and_help_with_0() {
         &["verify"],
         &["rebuild", "."],
         &["fit"],
-        &["fit", ".", "--spacing", "nan"],
+        &["fit", ".", "--tolerance", "nan"],
         &["texture", "."],
         &["texture", ".", "-p", "a.png", "--tiles", "0"],
         &["texture", ".", "-p", "a.png", "--tiles", "1.5"],
@@ -584,7 +580,7 @@ fn help() {
       cones    Show what more or fewer cones gain, and write lists of them
       verify   Read atlases back and check every property they must have
       rebuild  Make a mesh again from the geometry images of an atlas
-      fit      Fit spline surfaces to the images of a grid
+      fit      Fit a smooth spline surface to a mesh: USD, STEP, G+Smo
       texture  Lay a repeating image over the whole surface as one texture
       explain  Say in plain words why an asset failed, or where it is distorted
       schema   Print a JSON schema of what is written, or of the configuration

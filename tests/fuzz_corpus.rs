@@ -82,7 +82,6 @@ fn the_small_folder_and_its_seeds_can_be_read() {
         let shown = seed.display();
         let images = atlas::read_images(copy.path()).unwrap_or_else(|e| panic!("{shown}: {e}"));
         assert_eq!(images.images[0].position.len(), 64, "{shown}");
-        atlas::read_surface(copy.path()).unwrap_or_else(|e| panic!("{shown}: {e}"));
         metric::read_metric(copy.path()).unwrap_or_else(|e| panic!("{shown}: {e}"));
         gridded::read_gridded(copy.path()).unwrap_or_else(|e| panic!("{shown}: {e}"));
     }

@@ -295,3 +295,44 @@ fn configurations_are_valid_and_broken_ones_are_not() {
         ],
     );
 }
+
+/// Figures of spline surfaces.
+#[test]
+fn fits_are_valid() {
+    let root = tempfile::tempdir().expect("a folder");
+    let into = root.path().join("surface");
+    let mut command = program();
+    command.args([
+        "fit",
+        "fixtures/good/disk-mask.obj",
+        "--cells",
+        "200",
+        "--out",
+    ]);
+    assert!(
+        command
+            .arg(&into)
+            .output()
+            .expect("it runs")
+            .status
+            .success()
+    );
+    let text = std::fs::read(into.join("fit.json")).expect("readable");
+    let document: Value = serde_json::from_slice(&text).expect("JSON");
+    let fit = validator("fit");
+    assert_valid(&fit, &document, "fit.json");
+    assert_refused(
+        &fit,
+        &document,
+        &[
+            ("/unit", None),
+            ("/components", Some(json!({}))),
+            ("/components/0/closed", Some(json!("no"))),
+            ("/components/0/from_source/rms_of_diagonal", None),
+            (
+                "/components/0/step/normal_jump_regular/max_degrees",
+                Some(json!("0")),
+            ),
+        ],
+    );
+}

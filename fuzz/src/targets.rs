@@ -235,18 +235,15 @@ fn exr(bytes: &[u8]) {
 fn npz(bytes: &[u8]) {
     in_folder(&SMALL, |folder| {
         folder.put("atlas.npz", bytes);
-        if let Ok(surface) = atlas::read_surface(&folder.path) {
+        if let Ok(surface) = gridded::read_gridded(&folder.path) {
             let count = surface.positions.len();
-            assert!(
-                surface
-                    .faces
-                    .iter()
-                    .flatten()
-                    .all(|&v| (v as usize) < count)
-            );
+            let mut corners = surface.faces.iter().flatten();
+            assert!(corners.all(|&v| (v as usize) < count));
+            let count = surface.quads.points.len();
+            let mut corners = surface.quads.cells.iter().flatten();
+            assert!(corners.all(|&v| (v as usize) < count));
         }
         let _ = metric::read_metric(&folder.path);
-        let _ = gridded::read_gridded(&folder.path);
         let _ = atlas::read_images(&folder.path);
     });
 }

@@ -1,8 +1,9 @@
 //! Arguments and their help texts.
 
 use affine_atlas::batch::shard::{self, Shard};
-use affine_atlas::fit::{DEFAULT_SPACING, LEAST_SPACING};
+use affine_atlas::export::step::LengthUnit;
 use affine_atlas::job::texture::{DEFAULT_SIZE, SIZE_RANGE, TILES_RANGE};
+use affine_atlas::spline::DEFAULT_ANGLE;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -89,7 +90,7 @@ pub enum Command {
     /// Make a mesh again from the geometry images of an atlas
     #[command(after_help = REBUILD_EXAMPLES, after_long_help = REBUILD_EXAMPLES)]
     Rebuild(Rebuild),
-    /// Fit spline surfaces to the images of a grid
+    /// Fit a smooth spline surface to a mesh: USD, STEP, G+Smo
     #[command(after_help = FIT_EXAMPLES, after_long_help = FIT_EXAMPLES)]
     Fit(Fit),
     /// Lay a repeating image over the whole surface as one texture
@@ -213,16 +214,20 @@ vertices of each, and angles between normals.";
 
 const FIT_EXAMPLES: &str = "\
 Examples:
-  affine-atlas build bunny.obj
+  affine-atlas fit bunny.obj
+  affine-atlas fit bunny.obj --cells 8000 --unit m -o bunny-spline
+  affine-atlas fit bunny.obj --tolerance 0.1mm
   affine-atlas fit affine-atlas-out/bunny
-  affine-atlas fit affine-atlas-out/bunny -o bunny-splines --spacing 2 --against bunny.obj
 
-Fits bicubic B-spline surfaces to the images of a grid: one to every block, or to each of its parts where it
-is divided so that whole sides meet. Neighbours share the control points of their sides, so that there are no
-gaps. The new folder holds
-  NAME.xml   a MultiPatch with interfaces and boundary, as G+Smo reads it (one a component)
-  fit.json   block, cells and errors of every surface, errors of every shared side
-It appears when it is complete.";
+Fits one smooth surface to a mesh: the Catmull-Clark limit surface on the integer grid of its atlas, with
+creases on sharp edges. Of a folder that `build` wrote it takes the grid there. The new folder holds
+  NAME.cage.obj, NAME.usda  the control mesh; USD with creases and corners, for subdivision surfaces
+  NAME.step                 the same surface as B-spline faces of one shell, a solid where it is closed (AP242)
+  NAME.xml                  the same as a MultiPatch of G+Smo, with interfaces and boundary
+  NAME.glb                  triangles with normals
+  NAME.zebra.png            zebra stripes
+  fit.json, fit.html        distances, angles between normals, control points
+for each component. It appears when it is complete.";
 
 const TEXTURE_EXAMPLES: &str = "\
 Examples:
@@ -389,18 +394,25 @@ pub struct Rebuild {
 
 #[derive(Debug, Args)]
 pub struct Fit {
-    /// Folder that `build` wrote for a mesh with images.domain = "grid"
-    #[arg(value_name = "DIR")]
-    pub folder: PathBuf,
-    /// Folder to write, replacing an older one [default: DIR.fit]
+    /// Mesh, or folder that `build` wrote for one
+    #[arg(value_name = "MESH")]
+    pub input: PathBuf,
+    /// Folder to write, replacing an older one [default: MESH.fit without the mesh's extension]
     #[arg(short, long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
-    /// Sample steps that a knot interval takes, at least 2: fewer give more control points
-    #[arg(long, value_name = "STEPS", default_value_t = DEFAULT_SPACING, value_parser = spacing)]
-    pub spacing: f64,
-    /// Measure the distance from this mesh instead of the atlas's own surface
-    #[arg(long, value_name = "MESH")]
-    pub against: Option<PathBuf>,
+    /// Cells of the control mesh, about; each is a bicubic piece [default: 2000]
+    #[arg(long, value_name = "N", conflicts_with = "tolerance", value_parser = clap::value_parser!(u32).range(1..))]
+    pub cells: Option<u32>,
+    /// Take the coarsest grid with which no place of the mesh is farther from the surface: a part of the diagonal
+    /// such as 0.001, or a length with a unit such as 0.1mm
+    #[arg(long, value_name = "DISTANCE", value_parser = tolerance)]
+    pub tolerance: Option<Tolerance>,
+    /// How far normals of STEP faces may differ beside irregular points, degrees; less takes more control points
+    #[arg(long, value_name = "DEGREES", default_value_t = DEFAULT_ANGLE, value_parser = angle)]
+    pub angle: f64,
+    /// Unit of the mesh's coordinates: mm, cm, m or in
+    #[arg(long, value_name = "UNIT", default_value = "mm", value_parser = unit)]
+    pub unit: LengthUnit,
     /// Write JSON instead of text
     #[arg(long)]
     pub json: bool,
@@ -428,13 +440,52 @@ pub struct Texture {
     pub json: bool,
 }
 
-/// A number from the least spacing on.
-fn spacing(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok();
-    let good = |x: &f64| x.is_finite() && *x >= LEAST_SPACING;
-    number
-        .filter(good)
-        .ok_or_else(|| format!("it must be a number from {LEAST_SPACING} on"))
+/// A largest distance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tolerance {
+    /// As a part of the diagonal.
+    OfDiagonal(f64),
+    /// In metres.
+    Metres(f64),
+}
+
+/// A part of the diagonal, or a length.
+fn tolerance(text: &str) -> Result<Tolerance, String> {
+    let wanted = "it must be a part of the diagonal below 1, such as 0.001, or a length such as 0.1mm (mm, cm, m, in)";
+    // Millimetres end with the symbol of metres.
+    let mut units = LengthUnit::ALL
+        .iter()
+        .filter_map(|u| Some((text.strip_suffix(u.symbol())?, u)));
+    let found = units.find_map(|(number, unit)| Some((number.trim().parse::<f64>().ok()?, unit)));
+    let is_good = |x: &f64| x.is_finite() && *x > 0.0;
+    match found {
+        Some((length, unit)) => Some(length)
+            .filter(is_good)
+            .map(|x| Tolerance::Metres(x * unit.metres())),
+        None => text
+            .parse()
+            .ok()
+            .filter(|x| is_good(x) && *x < 1.0)
+            .map(Tolerance::OfDiagonal),
+    }
+    .ok_or_else(|| wanted.to_owned())
+}
+
+/// An angle that grids of knots can reach.
+fn angle(text: &str) -> Result<f64, String> {
+    let number = text
+        .parse()
+        .ok()
+        .filter(|x| (LEAST_ANGLE..=90.0).contains(x));
+    number.ok_or_else(|| format!("it must be a number from {LEAST_ANGLE} to 90"))
+}
+
+/// Least angle between normals that may be asked for, degrees.
+const LEAST_ANGLE: f64 = 0.001;
+
+fn unit(text: &str) -> Result<LengthUnit, String> {
+    let unit = LengthUnit::ALL.into_iter().find(|u| u.symbol() == text);
+    unit.ok_or_else(|| "it must be mm, cm, m or in".to_owned())
 }
 
 #[derive(Debug, Args)]
@@ -476,6 +527,8 @@ pub enum SchemaOf {
     Config,
     /// a line of a plan
     Plan,
+    /// fit.json
+    Fit,
 }
 
 #[cfg(test)]

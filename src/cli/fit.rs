@@ -1,25 +1,28 @@
 //! `affine-atlas fit`.
 
-use super::arguments::{Fit, Global, LogFormat};
+use super::arguments::{Fit, Global, LogFormat, Tolerance};
 use super::check::show_failure;
 use super::inputs::start_threads;
 use super::problem::Problem;
 use super::work::{FitRequest, Work};
 use super::{exit, interrupt, panics, terminal};
 use affine_atlas::config::Config;
+use affine_atlas::job::fit::{FitParams, Size};
 use affine_atlas::outcome::{Failure, FailureKind};
 use std::path::{Path, PathBuf};
 
-/// Fits one asset. Exit code 1 where its folder does not make surfaces.
+/// Fits one asset. Exit code 1 where it has no surfaces.
 pub fn run(fit: &Fit, global: &Global, work: &Work) -> Result<u8, Problem> {
-    if !fit.folder.is_dir() {
-        return Err(Problem::NoFolder {
-            path: fit.folder.clone(),
-        });
-    }
+    let is_folder = fit.input.is_dir();
     let out = match &fit.out {
         Some(out) => out.clone(),
-        None => beside(&fit.folder, ".fit"),
+        None if is_folder => beside(&fit.input, ".fit"),
+        None => PathBuf::from(
+            fit.input
+                .with_extension("fit")
+                .file_name()
+                .unwrap_or_default(),
+        ),
     };
     let no_name = || Problem::NoName { path: out.clone() };
     let name = out.file_name().ok_or_else(no_name)?;
@@ -30,12 +33,21 @@ pub fn run(fit: &Fit, global: &Global, work: &Work) -> Result<u8, Problem> {
     start_threads(global.threads, &Config::default())?;
     let announce = !global.quiet && global.log_format == LogFormat::Text;
     interrupt::install(work.remove_staging, announce);
+    let size = match (fit.cells, fit.tolerance) {
+        (Some(cells), _) => Size::Cells(cells as usize),
+        (None, Some(Tolerance::OfDiagonal(part))) => Size::OfDiagonal(part),
+        (None, Some(Tolerance::Metres(length))) => Size::Length(length / fit.unit.metres()),
+        (None, None) => Size::Default,
+    };
     let request = FitRequest {
-        folder: fit.folder.clone(),
+        input: fit.input.clone(),
         root: root.to_owned(),
         name: name.to_string_lossy().into_owned(),
-        spacing: fit.spacing,
-        against: fit.against.clone(),
+        params: FitParams {
+            size,
+            angle: fit.angle.to_radians(),
+            unit: fit.unit,
+        },
     };
     let fitted = panics::catch(|| (work.fit)(&request)).unwrap_or_else(|panic| {
         Err(Failure {
@@ -53,7 +65,7 @@ pub fn run(fit: &Fit, global: &Global, work: &Work) -> Result<u8, Problem> {
             Ok(exit::GOOD)
         }
         Err(failure) => {
-            let name = fit.folder.display().to_string();
+            let name = fit.input.display().to_string();
             show_failure(&name, &failure, global.log_format);
             Ok(match failure.kind {
                 FailureKind::Internal => exit::INTERNAL,

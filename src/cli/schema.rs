@@ -12,6 +12,7 @@ pub fn run(asked: &Schema) -> Result<u8, Problem> {
         SchemaOf::Manifest => schema::manifest(),
         SchemaOf::Config => schema::config(),
         SchemaOf::Plan => schema::plan(),
+        SchemaOf::Fit => schema::fit(),
     };
     terminal::print(&format!("{schema:#}\n"));
     Ok(exit::GOOD)

@@ -8,6 +8,7 @@ use affine_atlas::batch::worker::Job;
 use affine_atlas::batch::{Batch, Task, Watcher};
 use affine_atlas::config::Config;
 use affine_atlas::config::assets::Asset;
+use affine_atlas::job::fit::FitParams;
 use affine_atlas::job::texture::TextureParams;
 use affine_atlas::observe::Observer;
 use affine_atlas::outcome::{AssetOutcome, Failure};
@@ -38,7 +39,7 @@ pub struct Work {
     pub verify: fn(&VerifyRequest) -> Result<VerifyResult, Failure>,
     /// Makes a mesh again from an asset's folder.
     pub rebuild: fn(&RebuildRequest) -> Result<RebuildResult, Failure>,
-    /// Fits spline surfaces to an asset's folder and writes them into another.
+    /// Fits spline surfaces to a mesh or an asset's folder and writes them into a folder.
     pub fit: fn(&FitRequest) -> Result<FitResult, Failure>,
     /// Lays a pattern over an asset's surface and writes the texture into a folder.
     pub texture: fn(&TextureRequest) -> Result<TextureResult, Failure>,
@@ -115,16 +116,14 @@ pub struct RebuildRequest {
 
 /// What `fit` is asked for.
 pub struct FitRequest {
-    /// An asset's folder.
-    pub folder: PathBuf,
+    /// A mesh, or an asset's folder.
+    pub input: PathBuf,
     /// Folder that holds the folder to write.
     pub root: PathBuf,
     /// Name of the folder to write.
     pub name: String,
-    /// Sample steps a knot interval.
-    pub spacing: f64,
-    /// A mesh to measure against.
-    pub against: Option<PathBuf>,
+    /// How.
+    pub params: FitParams,
 }
 
 /// What `fit` found.

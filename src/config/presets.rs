@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// What the atlas is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Preset {
-    /// Full grids for spline surfaces, sampled as densely as `affine-atlas fit` makes use of.
+    /// The integer grid that `affine-atlas fit` lays its surface on.
     #[serde(rename = "spline-fit")]
     SplineFit,
     /// As many texels in all as a geometry image of 256 by 256 has.
@@ -40,8 +40,7 @@ impl Preset {
     #[must_use]
     pub fn settings(self) -> &'static str {
         match self {
-            // A knot interval takes four sample steps: four of them a side of a cell.
-            Self::SplineFit => "[images]\ndomain = \"grid\"\n[grid]\nsamples_per_cell = 16\n",
+            Self::SplineFit => "[images]\ndomain = \"grid\"\n",
             // More cones vary less in scale, and one texel of padding is what bilinear interpolation needs: at so few texels each counts.
             Self::GeometryImage256 => {
                 "[cones]\ncount = 16\n[images]\ndomain = \"flat\"\nchannels = [\"normal\"]\n[patches]\n\

@@ -13,6 +13,7 @@
 pub mod atlas_json;
 mod error;
 pub mod exr;
+pub mod fit;
 pub mod folder;
 pub mod gismo;
 pub mod glb;
@@ -29,6 +30,8 @@ pub mod report;
 #[cfg(test)]
 pub(crate) mod sample;
 mod shapes;
+pub mod step;
+pub mod usd;
 
 pub use error::{Action, EncodeError, ExportError};
 pub use provenance::Provenance;

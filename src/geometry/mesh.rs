@@ -4,7 +4,7 @@
 //! Attributes are stored a *corner* (face × 3 × components), so that seams of normals and texture
 //! coordinates survive welding, and are interpolated through every edit.
 
-use crate::geometry::connectivity::Connectivity;
+use crate::geometry::connectivity::{Connectivity, ConnectivityError};
 use crate::geometry::ids::{EdgeId, FaceId, FaceVec, NONE, VertexId, VertexVec};
 
 /// What a corner attribute means.
@@ -260,6 +260,21 @@ pub struct Mesh {
 }
 
 impl Mesh {
+    /// Positions and faces with nothing that they came from.
+    ///
+    /// # Errors
+    /// Faces that make no surface.
+    pub fn bare(positions: Vec<[f64; 3]>, faces: &[[u32; 3]]) -> Result<Self, ConnectivityError> {
+        Ok(Self {
+            connectivity: Connectivity::from_faces(faces, positions.len())?,
+            source_vertex: VertexVec::filled(NONE, positions.len()),
+            positions: positions.into(),
+            source_face: FaceVec::filled(NONE, faces.len()),
+            face_material: FaceVec::filled(NONE, faces.len()),
+            attributes: Vec::new(),
+        })
+    }
+
     /// Positions of the corners of a face.
     pub fn face_positions(&self, f: FaceId) -> [[f64; 3]; 3] {
         self.connectivity

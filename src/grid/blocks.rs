@@ -56,7 +56,7 @@ impl Block {
 }
 
 /// The point at column i and row j of the corners of a block's squares.
-pub(super) fn corner(mesh: &QuadMesh, block: &Block, [i, j]: [usize; 2]) -> u32 {
+pub(super) fn corner(mesh: Squares<'_>, block: &Block, [i, j]: [usize; 2]) -> u32 {
     let [w, h] = block.cells;
     let (column, row) = (i.min(w - 1), j.min(h - 1));
     let (q, k) = block.squares[row * w + column];
@@ -78,19 +78,67 @@ pub struct Blocks {
     pub sides: Vec<[Vec<Piece>; 4]>,
 }
 
+/// Squares of a mesh.
+#[derive(Clone, Copy, Debug)]
+pub struct Squares<'a> {
+    /// Corners, counterclockwise.
+    pub quads: &'a [[u32; 4]],
+    /// Across side k, from corner k to the next: square and side there; `None` on the border.
+    pub across: &'a [[Option<(u32, u8)>; 4]],
+}
+
+/// Where blocks are divided.
+#[derive(Clone, Debug)]
+pub struct Rules {
+    /// Whether lines start along all edges of a point.
+    pub starts: Vec<bool>,
+    /// Of every square, the sides that divide it from the next from the beginning; those on the border do anyway.
+    pub walls: Vec<[bool; 4]>,
+    /// Whether such sides and those at points where lines start divide blocks to the end, so that every such point is a corner of all its blocks.
+    pub are_kept: bool,
+}
+
 struct Walls<'a> {
-    mesh: &'a QuadMesh,
+    mesh: Squares<'a>,
+    rules: &'a Rules,
     /// Of every square, its four sides.
     is_wall: Vec<[bool; 4]>,
 }
 
 impl QuadMesh {
+    /// Its squares.
+    pub fn squares(&self) -> Squares<'_> {
+        Squares {
+            quads: &self.quads,
+            across: &self.across,
+        }
+    }
+
     /// See the module docs.
     pub fn blocks(&self) -> Result<Blocks, GridError> {
+        let points = self.points.iter().zip(self.border());
+        let starts = points.map(|(p, is_border)| match is_border {
+            true => p.valence > 3,
+            false => p.valence != 4,
+        });
+        self.squares().blocks(&Rules {
+            starts: starts.collect(),
+            walls: vec![[false; 4]; self.quads.len()],
+            are_kept: false,
+        })
+    }
+}
+
+impl<'a> Squares<'a> {
+    /// Blocks by rules.
+    pub fn blocks(self, rules: &'a Rules) -> Result<Blocks, GridError> {
         let on_border = self.across.iter().map(|a| a.map(|across| across.is_none()));
+        let both =
+            |(border, walls): ([bool; 4], &[bool; 4])| [0, 1, 2, 3].map(|k| border[k] || walls[k]);
         let mut walls = Walls {
             mesh: self,
-            is_wall: on_border.collect(),
+            is_wall: on_border.zip(&rules.walls).map(both).collect(),
+            rules,
         };
         walls.race();
         let mut blocks = walls.rectangles()?;
@@ -101,13 +149,22 @@ impl QuadMesh {
     }
 
     /// The side that goes on where one ends at a point with four edges.
-    fn straight_on(&self, (q, k): (u32, u8)) -> Option<(u32, u8)> {
+    fn straight_on(self, (q, k): (u32, u8)) -> Option<(u32, u8)> {
         let (q, k) = self.across[q as usize][usize::from((k + 1) & 3)]?;
         Some((q, (k + 1) & 3))
     }
 }
 
 impl Walls<'_> {
+    /// Whether a side divides blocks to the end.
+    fn is_kept(&self, (q, k): (u32, u8)) -> bool {
+        let corners = self.mesh.quads[q as usize];
+        let ends = [k, (k + 1) & 3].map(|k| corners[usize::from(k)]);
+        self.rules.are_kept
+            && (self.rules.walls[q as usize][usize::from(k)]
+                || ends.iter().any(|&v| self.rules.starts[v as usize]))
+    }
+
     fn put(&mut self, (q, k): (u32, u8)) {
         self.is_wall[q as usize][usize::from(k)] = true;
         if let Some((q, k)) = self.mesh.across[q as usize][usize::from(k)] {
@@ -119,31 +176,18 @@ impl Walls<'_> {
         self.is_wall[q as usize][usize::from(k & 3)]
     }
 
-    /// Points on the border, and those where lines start.
-    fn kinds(&self) -> (Vec<bool>, Vec<bool>) {
-        let mesh = self.mesh;
-        let is_border = mesh.border();
-        let points = mesh.points.iter().zip(&is_border);
-        let starts = points.map(|(p, &border)| {
-            if border {
-                p.valence > 3
-            } else {
-                p.valence != 4
-            }
-        });
-        let starts = starts.collect();
-        (is_border, starts)
-    }
-
     /// Lines from irregular points.
     fn race(&mut self) {
         let mesh = self.mesh;
-        let (is_border, starts) = self.kinds();
-        let mut is_met: Vec<bool> = is_border
-            .iter()
-            .zip(&starts)
-            .map(|(a, b)| *a || *b)
-            .collect();
+        let starts = &self.rules.starts;
+        // Where lines start, and on walls.
+        let mut is_met = starts.clone();
+        for (corners, walls) in mesh.quads.iter().zip(&self.is_wall) {
+            for k in (0..4).filter(|&k| walls[k]) {
+                is_met[corners[k] as usize] = true;
+                is_met[corners[(k + 1) % 4] as usize] = true;
+            }
+        }
         let mut running: Vec<(u32, u8)> = Vec::new();
         for (q, corners) in mesh.quads.iter().enumerate() {
             for k in 0..4u8 {
@@ -330,7 +374,11 @@ impl Walls<'_> {
             let Some(beyond) = left[other].as_ref().filter(|_| now == length) else {
                 continue;
             };
-            for (q, k) in side_of(block, s) {
+            let side = side_of(block, s);
+            if side.iter().any(|&side| self.is_kept(side)) {
+                continue;
+            }
+            for (q, k) in side {
                 self.is_wall[q as usize][usize::from(k)] = false;
                 if let Some((q, k)) = self.mesh.across[q as usize][usize::from(k)] {
                     self.is_wall[q as usize][usize::from(k)] = false;
@@ -403,7 +451,10 @@ impl Walls<'_> {
 }
 
 /// What lies across the sides of blocks.
-pub(super) fn sides(mesh: &QuadMesh, blocks: &[Block]) -> Result<Vec<[Vec<Piece>; 4]>, GridError> {
+pub(super) fn sides(
+    mesh: Squares<'_>,
+    blocks: &[Block],
+) -> Result<Vec<[Vec<Piece>; 4]>, GridError> {
     let along = Along::new(mesh, blocks);
     blocks.iter().map(|b| along.pieces(mesh, b)).collect()
 }
@@ -412,7 +463,7 @@ pub(super) fn sides(mesh: &QuadMesh, blocks: &[Block]) -> Result<Vec<[Vec<Piece>
 struct Along(Vec<[Option<(usize, usize, usize)>; 4]>);
 
 impl Along {
-    fn new(mesh: &QuadMesh, blocks: &[Block]) -> Self {
+    fn new(mesh: Squares<'_>, blocks: &[Block]) -> Self {
         let mut along = Self(vec![[None; 4]; mesh.quads.len()]);
         for (b, block) in blocks.iter().enumerate() {
             along.put(b, block);
@@ -429,7 +480,7 @@ impl Along {
     }
 
     /// What lies across the sides of one block.
-    fn pieces(&self, mesh: &QuadMesh, block: &Block) -> Result<[Vec<Piece>; 4], GridError> {
+    fn pieces(&self, mesh: Squares<'_>, block: &Block) -> Result<[Vec<Piece>; 4], GridError> {
         let mut all: [Vec<Piece>; 4] = Default::default();
         for (s, pieces) in all.iter_mut().enumerate() {
             for (i, (q, k)) in side_of(block, s).into_iter().enumerate() {
@@ -463,7 +514,7 @@ impl Along {
 }
 
 /// Squares along a side of a block, counterclockwise, with their sides there.
-pub(super) fn side_of(block: &Block, s: usize) -> Vec<(u32, u8)> {
+pub(crate) fn side_of(block: &Block, s: usize) -> Vec<(u32, u8)> {
     let [w, h] = block.cells;
     let at = |i: usize, j: usize| {
         let (q, k) = block.squares[j * w + i];

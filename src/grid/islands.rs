@@ -100,7 +100,9 @@ impl Island {
         for j in 0..=h {
             for i in 0..=w {
                 let at = [i as i64, j as i64];
-                island.points.insert(at, corner(mesh, block, [i, j]));
+                island
+                    .points
+                    .insert(at, corner(mesh.squares(), block, [i, j]));
                 if i < w && j < h {
                     island.cells.insert(at.map(|x| 2 * x + 1));
                 }
@@ -282,7 +284,7 @@ pub(super) fn arrange(
             *block = block.turned(motion.turns);
         }
     }
-    blocks.sides = sides(mesh, &blocks.blocks)?;
+    blocks.sides = sides(mesh.squares(), &blocks.blocks)?;
     Ok(Islands {
         place,
         corner: packed.corner,

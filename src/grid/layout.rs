@@ -98,7 +98,7 @@ pub(crate) fn locate(
                     double_area([p[0], q, p[2]]),
                     double_area([p[0], p[1], q]),
                 ];
-                let point = corner(mesh, own, [i, j]) as usize;
+                let point = corner(mesh.squares(), own, [i, j]) as usize;
                 if w.iter().any(|w| *w < 0.0) || points[point].is_some() {
                     continue;
                 }

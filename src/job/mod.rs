@@ -2,9 +2,10 @@
 //!
 //! `pipeline` is that of the tutorial (5.1) on one page, its first half on another (`flatten`): data only
 //! flows forward, and a finished value is never changed. [`build`] does it for every component of a mesh in memory, [`run`] for a file,
-//! [`inspect`] stops before the flow, [`survey`] tries different cones, [`rebuild`] goes back from images to a mesh, [`fit`] on to
-//! spline surfaces, [`texture`] lays a pattern over the surface, [`explain`] says what is wrong.
+//! [`inspect`] stops before the flow, [`survey`] tries different cones, [`rebuild`] goes back from images to a mesh, [`fit`] on to a
+//! spline surface, [`texture`] lays a pattern over the surface, [`explain`] says what is wrong.
 
+mod charting;
 mod error;
 pub mod explain;
 pub mod fit;
@@ -126,6 +127,13 @@ fn each(
         })?;
     }
     Ok(())
+}
+
+/// The last part of a folder's name; one that is given as `.` has one, too.
+fn folder_name(folder: &Path) -> String {
+    let resolved = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    let name = resolved.file_name().unwrap_or("surface".as_ref());
+    name.to_string_lossy().into_owned()
 }
 
 /// Who watches which component.

@@ -1,12 +1,10 @@
 //! From a component to its atlas: all stages, each with what the ones before it made.
 
 use super::BuildError;
-use super::flatten::{Flattened, flatten, prescribed};
+use super::charting::{Charting, chart};
 use crate::atlas::charted::Charted;
-use crate::atlas::develop::Development;
-use crate::atlas::geometry_image::SourceSurface;
 use crate::atlas::patches::Domain;
-use crate::atlas::{axes, charts, develop, geometry_image, patches};
+use crate::atlas::{geometry_image, patches};
 use crate::config::Config;
 use crate::flow::cones::Requests;
 use crate::geometry::deviation::Triangles;
@@ -26,53 +24,17 @@ pub(super) fn pipeline(
     observer: &dyn Observer,
     enter: &impl Fn(&'static str) -> Result<(), BuildError>,
 ) -> Result<AffineAtlas, BuildError> {
-    enter("cones")?;
-    let frame = component.frame;
-    let mesh = component.mesh?;
-    let (given, given_faces) = (mesh.positions.clone(), mesh.connectivity.to_faces());
-    let source = SourceSurface::of(&mesh, &config.images);
-    if config.domain() == Domain::Grid {
-        grid::check_inside(&mesh)?;
-    }
-    let mesh = match config.domain() {
-        // Features that were named are edges of the mesh as it is.
-        Domain::Grid if requests.features.is_empty() => grid::refined(mesh),
-        _ => mesh,
-    };
-    let prescription = prescribed(&mesh, requests, config)?;
-    let Flattened {
-        mesh,
-        metric,
-        prescription,
+    let Charting {
+        surface,
         layout,
-        layout_cut,
-        cut,
+        unfolded,
+        given,
+        given_faces,
+        source,
+        frame,
+        log,
         connectivity_repair,
-    } = flatten(mesh, prescription, config, observer, enter)?;
-    if config.domain() == Domain::Grid {
-        grid::check_size(given.len(), mesh.positions.len())?;
-    }
-    let c = &mesh.connectivity;
-    enter("charts")?;
-    let mut unfolded = develop::develop(&layout, layout_cut)?;
-    let mut central = Development::place(c, &cut, &layout, &unfolded);
-    if let Some(met) = &metric.quarter_turns {
-        let axis = axes::axis(&mesh, &cut, &central, &met.lines);
-        unfolded.turn(-axis);
-        central.turn(-axis);
-    }
-    let mut charts = charts::chart(c, &cut, &central, &layout, &unfolded, &prescription)?;
-    if metric.quarter_turns.is_some() {
-        charts.turn_like_central();
-    }
-    let surface = Charted {
-        mesh,
-        metric,
-        prescription,
-        cut,
-        central,
-        charts,
-    };
+    } = chart(component, requests, config, observer, enter)?;
     let (surface, patches, grid, no_grid) = match config.domain() {
         Domain::Flat => {
             enter("patches")?;
@@ -137,8 +99,8 @@ pub(super) fn pipeline(
     let atlas = AffineAtlas {
         topology,
         seamless: report::is_seamless(&charts),
-        repair: component.log.counts(),
-        repair_log: component.log,
+        repair: log.counts(),
+        repair_log: log,
         image_distance: image_distance.map(Into::into),
         flow: config.flow.clone(),
         mesh,

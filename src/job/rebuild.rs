@@ -3,7 +3,7 @@
 //! Uses the images, the seam samples and `atlas.json`, never the surface that the folder holds too.
 
 use crate::export::ExportError;
-use crate::export::glb::rebuilt::{self, Component};
+use crate::export::glb::plain::{self, Component};
 use crate::geometry::connectivity::Topology;
 use crate::geometry::deviation::{Deviation, Sampling, Triangles, deviation};
 use crate::geometry::mesh::{bounding_box, distance};
@@ -184,11 +184,12 @@ impl RebuiltAsset {
             .map(|c| Component {
                 name: &c.name,
                 positions: &c.mesh.positions,
+                normals: None,
                 faces: &c.mesh.faces,
                 origin: c.origin,
             })
             .collect();
-        rebuilt::encode(&components)
+        plain::encode(&components)
     }
 
     /// The same figures as `Display`, for programs.

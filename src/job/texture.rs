@@ -1,14 +1,13 @@
 //! From an atlas and an image that repeats to a textured surface: what `affine-atlas texture` does.
 
-use super::fit::folder_name;
+use super::folder_name;
 use crate::atlas::plane::doubled_area;
 use crate::export::ExportError;
 use crate::export::folder::{Contents, Staging};
 use crate::export::glb::textured::{self, Textured};
 use crate::export::pictures::colour::to_linear;
 use crate::export::pictures::{encode_png, painted as picture};
-use crate::geometry::connectivity::{Connectivity, ConnectivityError};
-use crate::geometry::ids::{FaceVec, NONE, VertexVec};
+use crate::geometry::connectivity::ConnectivityError;
 use crate::geometry::mesh::Mesh;
 use crate::outcome::{Failure, FailureKind};
 use crate::read::atlas::{FolderError, component_folders};
@@ -125,7 +124,8 @@ pub fn texture(folder: &Path, params: &TextureParams) -> Result<TexturedAsset, T
     for folder in folders {
         let name = folder_name(&folder);
         let surface = read_gridded(&folder)?;
-        let mesh = mesh(&surface).map_err(|source| TextureAssetError::Connectivity {
+        let mesh = Mesh::bare(surface.positions.clone(), &surface.faces);
+        let mesh = mesh.map_err(|source| TextureAssetError::Connectivity {
             name: name.clone(),
             source,
         })?;
@@ -149,19 +149,6 @@ pub fn texture(folder: &Path, params: &TextureParams) -> Result<TexturedAsset, T
         symmetry: exemplar.symmetry(tiling.copies),
         tiling,
         exemplar,
-    })
-}
-
-/// The surface without anything that textures do not need.
-fn mesh(surface: &GriddedSurface) -> Result<Mesh, ConnectivityError> {
-    let (vertices, faces) = (surface.positions.len(), surface.faces.len());
-    Ok(Mesh {
-        connectivity: Connectivity::from_faces(&surface.faces, vertices)?,
-        positions: surface.positions.clone().into(),
-        source_vertex: VertexVec::filled(NONE, vertices),
-        source_face: FaceVec::filled(NONE, faces),
-        face_material: FaceVec::filled(NONE, faces),
-        attributes: Vec::new(),
     })
 }
 

@@ -1,8 +1,7 @@
 //! Images and seams of one component's folder: what a reader of geometry images uses, and no more.
 //!
 //! *Enters:* a folder that a build wrote. *Leaves:* an [`ImageFolder`]: positions and masks of the images, the seam arrays
-//! of `atlas.npz`, and from `atlas.json` where the texels lie and the topology that is stated; and, for those who measure against
-//! it, a [`StoredSurface`].
+//! of `atlas.npz`, and from `atlas.json` where the texels lie and the topology that is stated.
 //!
 //! *Guaranteed:* nothing panics whatever the files hold, and memory is bounded by what they hold; images have the size that is stated; the
 //! arrays of seams have lengths that fit each other.
@@ -145,49 +144,10 @@ pub struct StoredImage {
     pub texel_to_patch: [[f64; 3]; 2],
     /// True where texels are grid corners of a block, false where they are texel centres of a `flat` patch.
     pub is_rectangle: bool,
-    /// Where the patch is a block of a grid.
-    pub block: Option<StoredBlock>,
     /// Surface points minus the image origin, row by row from the top.
     pub position: Vec<[f32; 3]>,
     /// 1 where the texel lies in the patch.
     pub alpha: Vec<f32>,
-}
-
-/// What is stated of a patch that is a block of a grid; not checked.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct StoredBlock {
-    /// Columns and rows of cells.
-    pub cells: [usize; 2],
-    /// Texels on a side of a cell.
-    pub samples_per_cell: usize,
-    /// Pieces of the bottom, the right, the top and the left side.
-    pub sides: Vec<Vec<StoredPiece>>,
-}
-
-/// A stretch of a block's side, counterclockwise, in cells; not checked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-pub struct StoredPiece {
-    /// First cell.
-    pub start: usize,
-    /// Cells.
-    pub length: usize,
-    /// Patch across; none at a border of the surface.
-    pub patch: Option<usize>,
-    /// Its side.
-    pub side: Option<usize>,
-    /// Its first cell.
-    pub other_start: Option<usize>,
-    /// Whether the cells across run the other way.
-    pub reversed: bool,
-}
-
-/// The surface that an atlas is defined on.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StoredSurface {
-    /// Source units.
-    pub positions: Vec<[f64; 3]>,
-    /// Counterclockwise; vertices are in range.
-    pub faces: Vec<[u32; 3]>,
 }
 
 /// Everything that a mesh is rebuilt from.
@@ -236,21 +196,6 @@ struct Patch {
     width: usize,
     height: usize,
     texel_to_patch: [[f64; 3]; 2],
-    cells: Option<[usize; 2]>,
-    samples_per_cell: Option<usize>,
-    sides: Option<Vec<Vec<StoredPiece>>>,
-}
-
-impl Patch {
-    /// What is stated of a block, where all of it is.
-    fn block(&self) -> Option<StoredBlock> {
-        (self.domain == DOMAINS[1]).then_some(())?;
-        Some(StoredBlock {
-            cells: self.cells?,
-            samples_per_cell: self.samples_per_cell?,
-            sides: self.sides.clone()?,
-        })
-    }
 }
 
 /// The folders of the components of an asset, in order: the asset's own where it has one component.
@@ -329,37 +274,6 @@ pub fn read_images(folder: &Path) -> Result<ImageFolder, FolderError> {
     })
 }
 
-/// Reads the surface of one component from `atlas.npz`.
-///
-/// # Errors
-/// A file that is missing or damaged, positions that are not finite, and faces of vertices that are not there.
-pub fn read_surface(folder: &Path) -> Result<StoredSurface, FolderError> {
-    let path = folder.join("atlas.npz");
-    let read = || -> Result<_, String> {
-        let mut npz = Npz::open(&path)?;
-        let (positions, vertices) = npz.read::<f64>("positions", &[None, Some(3)])?;
-        let (faces, _) = npz.read::<u32>("faces", &[None, Some(3)])?;
-        if let Some(at) = positions.iter().position(|x| !x.is_finite()) {
-            let (row, value) = (at / 3, positions[at]);
-            return Err(format!("row {row} of positions holds {value}"));
-        }
-        if let Some(at) = faces.iter().position(|&v| v as usize >= vertices) {
-            let (row, vertex) = (at / 3, faces[at]);
-            return Err(format!(
-                "row {row} of faces names vertex {vertex} of {vertices}"
-            ));
-        }
-        Ok(StoredSurface {
-            positions: positions.as_chunks::<3>().0.to_vec(),
-            faces: faces.as_chunks::<3>().0.to_vec(),
-        })
-    };
-    read().map_err(|problem| FolderError::File {
-        path: path.clone(),
-        problem,
-    })
-}
-
 /// `atlas.json`, once its format and version are known to be ours.
 pub(super) fn checked_json(path: &Path) -> Result<serde_json::Value, FolderError> {
     let of_file = |problem| FolderError::File {
@@ -424,7 +338,6 @@ fn image(folder: &Path, patch: &Patch) -> Result<StoredImage, FolderError> {
                 height: patch.height,
                 texel_to_patch: patch.texel_to_patch,
                 is_rectangle: patch.domain != DOMAINS[0],
-                block: patch.block(),
                 position: r
                     .into_iter()
                     .zip(g)

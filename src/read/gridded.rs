@@ -46,6 +46,21 @@ pub struct GriddedSurface {
     pub patches: Vec<Packing>,
     /// What positions are taken relative to before they become 32-bit floats.
     pub origin: [f64; 3],
+    /// The quad mesh.
+    pub quads: StoredQuads,
+}
+
+/// The quad mesh of a grid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StoredQuads {
+    /// Points, source units.
+    pub points: Vec<[f64; 3]>,
+    /// Corners of cells, counterclockwise from that at the column and row; in range.
+    pub cells: Vec<[u32; 4]>,
+    /// Patch of each; in range.
+    pub patch: Vec<u32>,
+    /// Column and row there.
+    pub at: Vec<[u32; 2]>,
 }
 
 impl GriddedSurface {
@@ -118,10 +133,15 @@ fn arrays(path: &Path, patches: Vec<Packing>, origin: [f64; 3]) -> Result<Gridde
     let (turns, _) = npz.read::<[u8; 3]>("grid_turns", &[Some(count), Some(3)])?;
     let (patch, _) = npz.read::<u32>("patch", &[Some(count)])?;
     let (patch_uv, _) = npz.read::<[[f64; 2]; 3]>("patch_uv", &corners)?;
+    let (points, point_count) = npz.read::<[f64; 3]>("quad_positions", &[None, Some(3)])?;
+    let (cells, cell_count) = npz.read::<[u32; 4]>("quads", &[None, Some(4)])?;
+    let (quad_patch, _) = npz.read::<u32>("quad_patch", &[Some(cell_count)])?;
+    let (quad_cell, _) = npz.read::<[u32; 2]>("quad_cell", &[Some(cell_count), Some(2)])?;
     for (name, numbers, row) in [
         ("positions", positions.as_flattened(), 3),
         ("grid_uv", grid_uv.as_flattened().as_flattened(), 6),
         ("patch_uv", patch_uv.as_flattened().as_flattened(), 6),
+        ("quad_positions", points.as_flattened(), 3),
     ] {
         if let Some(at) = numbers.iter().position(|x| !x.is_finite()) {
             return Err(format!("row {} of {name} holds {}", at / row, numbers[at]));
@@ -130,6 +150,8 @@ fn arrays(path: &Path, patches: Vec<Packing>, origin: [f64; 3]) -> Result<Gridde
     for (name, values, row, limit, what) in [
         ("faces", faces.as_flattened(), 3, vertices, "vertex"),
         ("patch", &patch[..], 1, patches.len(), "patch"),
+        ("quads", cells.as_flattened(), 4, point_count, "point"),
+        ("quad_patch", &quad_patch[..], 1, patches.len(), "patch"),
     ] {
         if let Some(at) = values.iter().position(|&x| x as usize >= limit) {
             let (row, value) = (at / row, values[at]);
@@ -166,6 +188,12 @@ fn arrays(path: &Path, patches: Vec<Packing>, origin: [f64; 3]) -> Result<Gridde
         patch_turns,
         patches,
         origin,
+        quads: StoredQuads {
+            points,
+            cells,
+            patch: quad_patch,
+            at: quad_cell,
+        },
     })
 }
 

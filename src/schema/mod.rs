@@ -1,5 +1,5 @@
 //! JSON schemas (draft 2020-12) of what the program reads and writes: `atlas.json`, a line of `manifest.jsonl`, a
-//! line of a plan, and `config.toml`.
+//! line of a plan, `fit.json`, and `config.toml`.
 //!
 //! *Enters:* nothing: those of the records follow from the types that are written, that of the configuration from
 //! [`KEYS`](crate::config::keys::KEYS) and the words of the commented `config.toml`. *Leaves:* a schema as JSON.
@@ -12,6 +12,7 @@ mod config;
 
 use crate::batch::plan::Line;
 use crate::export::atlas_json::Document;
+use crate::export::fit;
 use crate::export::manifest::Record;
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
@@ -32,6 +33,12 @@ pub fn atlas() -> Value {
 #[must_use]
 pub fn manifest() -> Value {
     of::<Record>("A line of manifest.jsonl of affine-atlas")
+}
+
+/// The schema of `fit.json`.
+#[must_use]
+pub fn fit() -> Value {
+    of::<fit::document::Document>("fit.json of affine-atlas")
 }
 
 /// The schema of one line of a plan.

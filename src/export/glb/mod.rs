@@ -12,7 +12,7 @@
 mod builder;
 pub mod marked;
 mod materials;
-pub mod rebuilt;
+pub mod plain;
 pub mod region;
 pub mod textured;
 mod vertices;

@@ -1,4 +1,4 @@
-//! Meshes rebuilt from geometry images: one GLB, a mesh and a node a component.
+//! Meshes of positions and normals, rebuilt from geometry images or of spline surfaces: one GLB, a mesh and a node a component.
 //!
 //! *Guaranteed:* the vertices of a mesh are those it was rebuilt with, shared by all faces that meet there: as watertight
 //! as the mesh. *Not guaranteed:* double precision: positions are 32-bit floats, relative to the node's translation.
@@ -19,6 +19,8 @@ pub struct Component<'a> {
     pub name: &'a str,
     /// Vertices, source units.
     pub positions: &'a [[f64; 3]],
+    /// Unit normals of the vertices; none where viewers are to shade faces flat.
+    pub normals: Option<&'a [[f32; 3]]>,
     /// Counterclockwise.
     pub faces: &'a [[u32; 3]],
     /// Taken off the positions and put on the node; exact as 32-bit floats.
@@ -51,13 +53,19 @@ pub fn encode(components: &[Component<'_>]) -> Result<Vec<u8>, ExportError> {
         accessor.min = Some(Value::from(low.to_vec()));
         accessor.max = Some(Value::from(high.to_vec()));
         let accessor = builder.root.push(accessor);
+        let mut attributes = BTreeMap::from([(Checked::Valid(Semantic::Positions), accessor)]);
+        if let Some(normals) = component.normals {
+            let normals = builder.attribute(normals, Type::Vec3);
+            let normals = builder.root.push(normals);
+            attributes.insert(Checked::Valid(Semantic::Normals), normals);
+        }
         let indices = builder.indices(component.faces.as_flattened(), position.len());
         let mesh = builder.root.push(Mesh {
             extensions: None,
             extras: None,
             name: Some(component.name.into()),
             primitives: vec![gltf::json::mesh::Primitive {
-                attributes: BTreeMap::from([(Checked::Valid(Semantic::Positions), accessor)]),
+                attributes,
                 extensions: None,
                 extras: None,
                 indices: Some(indices),

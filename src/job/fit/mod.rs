@@ -1,0 +1,243 @@
+//! From a mesh, or the folder of its atlas, to spline surfaces: what `affine-atlas fit` does.
+//!
+//! A folder has a grid already. Of a mesh the flat metric is computed once, and grids are laid on it as asked: with a number of cells, or
+//! the coarsest whose surface is near enough.
+
+mod search;
+mod text;
+mod write;
+
+use super::{BuildError, folder_name};
+use crate::config::ConfigError;
+use crate::export::ExportError;
+use crate::export::fit::document::{Component, Document};
+use crate::export::step::LengthUnit;
+use crate::grid::GridError;
+use crate::outcome::{Failure, FailureKind};
+use crate::read::atlas::{FolderError, component_folders};
+use crate::read::gridded::read_gridded;
+use crate::spline::cad::Faces;
+use crate::spline::patches::Patches;
+use crate::spline::{self, Gridded, Spline, SplineError};
+use std::path::Path;
+
+/// What is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FitParams {
+    /// The grid, where the input is a mesh.
+    pub size: Size,
+    /// Most by which normals of faces in STEP files are to differ beside irregular points, radians.
+    pub angle: f64,
+    /// What source units are.
+    pub unit: LengthUnit,
+}
+
+impl Default for FitParams {
+    fn default() -> Self {
+        Self {
+            size: Size::Default,
+            angle: spline::DEFAULT_ANGLE.to_radians(),
+            unit: LengthUnit::Millimetre,
+        }
+    }
+}
+
+/// How fine the grid is to be.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Size {
+    /// As a build would make it, or as it is in the folder.
+    #[default]
+    Default,
+    /// About so many cells, shared among components by area.
+    Cells(usize),
+    /// The coarsest with which no place of the mesh is farther from the surface than this part of the diagonal of its component.
+    OfDiagonal(f64),
+    /// Or than this length, source units.
+    Length(f64),
+}
+
+/// A component with its surface.
+#[derive(Clone, Debug)]
+pub struct FittedComponent {
+    /// Name.
+    pub name: String,
+    /// Its surface.
+    pub spline: Spline,
+    /// The same for CAD.
+    pub faces: Faces,
+    /// The same for analysis.
+    pub patches: Patches,
+}
+
+/// The surfaces of an asset.
+#[derive(Clone, Debug)]
+pub struct FittedAsset {
+    /// One a component.
+    pub components: Vec<FittedComponent>,
+    /// What was asked for.
+    pub params: FitParams,
+}
+
+/// Why there are no surfaces.
+#[derive(Debug, thiserror::Error)]
+pub enum FitAssetError {
+    /// The folder was refused.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// A grid is there already.
+    #[error(
+        "{} holds a grid of its own: give the mesh in place of the folder to choose the cells, or build it with grid.cells",
+        path.display()
+    )]
+    HasGrid {
+        /// The folder.
+        path: std::path::PathBuf,
+    },
+    /// The mesh was refused, or its flow.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// There is no grid.
+    #[error("{name} has no integer grid to lay a surface on: {source}")]
+    Grid {
+        /// Name of the component.
+        name: String,
+        /// Why.
+        source: GridError,
+    },
+    /// Not near enough with as many cells as are tried.
+    #[error(
+        "{name}: with {cells} cells the surface is still up to {reached:.3e} of the diagonal from the mesh, and {wanted:.3e} was asked for; ask for a larger --tolerance"
+    )]
+    Tolerance {
+        /// Name of the component.
+        name: String,
+        /// Most cells that were tried.
+        cells: usize,
+        /// Largest distance there, of the diagonal.
+        reached: f64,
+        /// What was asked for, of the diagonal.
+        wanted: f64,
+    },
+    /// The grid makes no surface.
+    #[error("{name}: {source}")]
+    Spline {
+        /// Name of the component.
+        name: String,
+        /// Why.
+        source: SplineError,
+    },
+    /// The surfaces cannot be written.
+    #[error(transparent)]
+    Export(#[from] ExportError),
+}
+
+impl From<ConfigError> for FitAssetError {
+    fn from(error: ConfigError) -> Self {
+        BuildError::from(error).into()
+    }
+}
+
+impl From<&FitAssetError> for Failure {
+    fn from(error: &FitAssetError) -> Self {
+        match error {
+            FitAssetError::Build(error) => Failure::from(error),
+            FitAssetError::Export(_) => Failure {
+                kind: FailureKind::Output,
+                message: error.to_string(),
+            },
+            _ => Failure {
+                kind: FailureKind::Input,
+                message: error.to_string(),
+            },
+        }
+    }
+}
+
+/// Fits the surfaces of every component of a mesh, or of an asset's folder.
+///
+/// # Errors
+/// See [`FitAssetError`].
+pub fn fit(input: &Path, params: &FitParams) -> Result<FittedAsset, FitAssetError> {
+    let splines = match input.is_dir() {
+        true => of_folder(input, params)?,
+        false => search::of_mesh(input, params)?,
+    };
+    let components = splines.into_iter().map(|(name, spline)| {
+        let (faces, patches) = spline.b_splines(params.angle).map_err(of_spline(&name))?;
+        Ok(FittedComponent {
+            name,
+            spline,
+            faces,
+            patches,
+        })
+    });
+    Ok(FittedAsset {
+        components: components.collect::<Result<_, FitAssetError>>()?,
+        params: *params,
+    })
+}
+
+fn of_spline(name: &str) -> impl Fn(SplineError) -> FitAssetError {
+    let name = name.to_owned();
+    move |source| FitAssetError::Spline {
+        name: name.clone(),
+        source,
+    }
+}
+
+fn of_folder(folder: &Path, params: &FitParams) -> Result<Vec<(String, Spline)>, FitAssetError> {
+    if params.size != Size::Default {
+        return Err(FitAssetError::HasGrid {
+            path: folder.to_owned(),
+        });
+    }
+    let folders = component_folders(folder)?;
+    let splines = folders.iter().map(|folder| {
+        let name = folder_name(folder);
+        let gridded = gridded(folder)?;
+        let spline = spline::fit(&gridded).map_err(of_spline(&name))?;
+        Ok((name, spline))
+    });
+    splines.collect()
+}
+
+/// The surface of one component's folder with its grid.
+///
+/// # Errors
+/// A folder without a grid, and files that are missing, damaged, or do not fit each other.
+pub fn gridded(folder: &Path) -> Result<Gridded, FolderError> {
+    let surface = read_gridded(folder)?;
+    Ok(Gridded {
+        positions: surface.positions,
+        faces: surface.faces,
+        block: surface.patch,
+        uv: surface.patch_uv,
+        points: surface.quads.points,
+        cells: surface.quads.cells,
+        cell_block: surface.quads.patch,
+        cell_at: surface.quads.at,
+    })
+}
+
+impl FittedAsset {
+    /// All figures.
+    pub fn document(&self) -> Document {
+        let components = self.components.iter().map(|c| {
+            let FittedComponent {
+                name,
+                spline,
+                faces,
+                patches,
+            } = c;
+            Component::new(name, spline, faces, patches)
+        });
+        Document {
+            format: "affine-atlas-fit".to_owned(),
+            version: 3,
+            generator: concat!("affine-atlas ", env!("CARGO_PKG_VERSION")).to_owned(),
+            unit: self.params.unit.name().to_owned(),
+            angle_degrees: self.params.angle.to_degrees(),
+            components: components.collect(),
+        }
+    }
+}

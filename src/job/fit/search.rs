@@ -1,0 +1,149 @@
+//! Spline surfaces of a mesh: a grid as fine as asked for, on one flat metric.
+
+use super::{FitAssetError, FitParams, Size, of_spline};
+use crate::config::{self, Config};
+use crate::export::folder::component_name;
+use crate::flow::cones;
+use crate::grid::{self, GridError, MOST_CELLS};
+use crate::job::charting::{Charting, chart};
+use crate::job::{BuildError, shares};
+use crate::read;
+use crate::repair;
+use crate::spline::{self, Gridded, Spline};
+use std::path::Path;
+
+/// Cells that a search begins with.
+const FIRST: usize = 200;
+/// Most cells that it tries.
+const MOST: usize = MOST_CELLS / 4;
+/// By how many times cells grow from one try to the next, at least and at most.
+const GROWTH: [f64; 2] = [1.5, 6.0];
+/// Tries between the finest that is not near enough and the coarsest that is.
+const BISECTIONS: usize = 3;
+
+/// Of every component its name and surface.
+pub(super) fn of_mesh(
+    path: &Path,
+    params: &FitParams,
+) -> Result<Vec<(String, Spline)>, FitAssetError> {
+    let mut keys = vec!["preset=spline-fit".to_owned()];
+    if let Size::Cells(cells) = params.size {
+        keys.push(format!("grid.cells={cells}"));
+    }
+    let config = config::defaults(&keys)?.config;
+    let asset = read::read(path, &config.limits).map_err(BuildError::from)?;
+    let repaired = repair::repair(&asset.soup, &config.repair).map_err(BuildError::from)?;
+    let config = config.resolved()?;
+    let requests = cones::assign(&repaired, &config.cones, &config.boundary, &config.features);
+    let requests = requests.map_err(BuildError::from)?;
+    let shares = shares::shares(&repaired.components);
+    let stem = path.file_stem().unwrap_or("surface".as_ref());
+    let stem = stem.to_string_lossy().into_owned();
+    let count = repaired.components.len();
+    let parts = repaired.components.into_iter().zip(requests).zip(shares);
+    let mut splines = Vec::with_capacity(count);
+    for (index, ((component, requests), share)) in parts.enumerate() {
+        let name = match count {
+            1 => stem.clone(),
+            _ => component_name(index),
+        };
+        let config = shares::of_share(&config, share).map_err(BuildError::from)?;
+        let charting = chart(component, &requests, &config, &(), &|_| Ok(()))?;
+        let spline = match params.size {
+            Size::Default | Size::Cells(_) => one(&charting, &config, &name, config.grid.cells)?,
+            Size::OfDiagonal(part) => coarsest(&charting, &config, &name, |_| part)?,
+            Size::Length(length) => coarsest(&charting, &config, &name, |d| length / d)?,
+        };
+        splines.push((name, spline));
+    }
+    Ok(splines)
+}
+
+/// The surface on a grid of about so many cells.
+fn one(
+    charting: &Charting,
+    config: &Config,
+    name: &str,
+    cells: usize,
+) -> Result<Spline, FitAssetError> {
+    let gridded = gridded(charting, config, cells).map_err(|source| FitAssetError::Grid {
+        name: name.to_owned(),
+        source,
+    })?;
+    spline::fit(&gridded).map_err(of_spline(name))
+}
+
+/// The surface on the coarsest grid with which it is near enough; `tolerance` is a part of the diagonal, which it is told.
+fn coarsest(
+    charting: &Charting,
+    config: &Config,
+    name: &str,
+    tolerance: impl Fn(f64) -> f64,
+) -> Result<Spline, FitAssetError> {
+    let (mut cells, mut too_coarse) = (FIRST, 0);
+    let mut near = loop {
+        let tried = one(charting, config, name, cells);
+        let growth = match &tried {
+            Ok(spline) => {
+                let (off, wanted) = (
+                    spline.errors.max / spline.diagonal,
+                    tolerance(spline.diagonal),
+                );
+                if off <= wanted {
+                    break tried?;
+                }
+                if cells >= MOST {
+                    return Err(FitAssetError::Tolerance {
+                        name: name.to_owned(),
+                        cells,
+                        reached: off,
+                        wanted,
+                    });
+                }
+                // Distances go with the area of a cell.
+                off / wanted
+            }
+            // Some cones lie nearer to each other than coarse cells.
+            Err(FitAssetError::Grid { .. }) if cells < MOST => GROWTH[0],
+            Err(_) => return tried,
+        };
+        too_coarse = cells;
+        cells = ((cells as f64 * growth.clamp(GROWTH[0], GROWTH[1])) as usize).min(MOST);
+    };
+    for _ in 0..BISECTIONS {
+        let middle = ((too_coarse as f64 * cells as f64).sqrt()) as usize;
+        if too_coarse == 0 || middle <= too_coarse || middle >= cells {
+            break;
+        }
+        match one(charting, config, name, middle) {
+            Ok(spline) if spline.errors.max <= tolerance(spline.diagonal) * spline.diagonal => {
+                (near, cells) = (spline, middle);
+            }
+            Ok(_) | Err(FitAssetError::Grid { .. }) => too_coarse = middle,
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(near)
+}
+
+/// A grid of about so many cells with the surface on it, in source units.
+fn gridded(charting: &Charting, config: &Config, cells: usize) -> Result<Gridded, GridError> {
+    let mut params = config.grid.clone();
+    params.cells = cells;
+    let surface = charting.surface.clone();
+    let (surface, layout, grid) = grid::grid(surface, &params, config.patches.padding)?;
+    let frame = &charting.frame;
+    let out = |points: &[[f64; 3]]| points.iter().map(|&p| frame.leave(p)).collect();
+    let faces = surface.mesh.connectivity.faces();
+    let cells = grid.cells_in_blocks();
+    Ok(Gridded {
+        positions: out(surface.mesh.positions.as_slice()),
+        faces: surface.mesh.connectivity.to_faces(),
+        block: faces.map(|f| layout.face_patch[f].index() as u32).collect(),
+        uv: layout.uv.as_slice().to_vec(),
+        points: out(&grid.points),
+        cells: cells.iter().map(|c| c.corners).collect(),
+        cell_block: cells.iter().map(|c| c.block).collect(),
+        cell_at: cells.iter().map(|c| c.at).collect(),
+    })
+}

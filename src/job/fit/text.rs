@@ -1,0 +1,57 @@
+//! Figures of spline surfaces for a reader.
+
+use super::FittedAsset;
+use std::fmt;
+
+impl fmt::Display for FittedAsset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for c in self.document().components {
+            let plural = |n: usize| if n == 1 { "" } else { "s" };
+            let kind = if c.closed { "closed" } else { "open" };
+            writeln!(
+                f,
+                "{}: {} control points on {} cells, {kind}; {} crease edge{}, {} corner{}",
+                c.name,
+                c.control_points,
+                c.cells,
+                c.crease_edges,
+                plural(c.crease_edges),
+                c.corners,
+                plural(c.corners),
+            )?;
+            let source = c.from_source;
+            writeln!(
+                f,
+                "  from the mesh: RMS {:.3e}, at most {:.3e} (of the diagonal {:.6} {}); normals {:.2} degrees off on average, 95 % within {:.2}",
+                source.rms_of_diagonal,
+                source.max_of_diagonal,
+                c.diagonal_source_units,
+                self.params.unit.name(),
+                c.normal_deviation.mean_degrees,
+                c.normal_deviation.p95_degrees,
+            )?;
+            let step = &c.step;
+            writeln!(
+                f,
+                "  STEP: {} face{}, {} control points; normals turn by {:.1e} degrees at most between regular cells, beside irregular points by {:.3} (95 %) and {:.3} (most)",
+                step.faces,
+                plural(step.faces),
+                step.control_points,
+                step.normal_jump_regular.max_degrees,
+                step.normal_jump_irregular.p95_degrees,
+                step.normal_jump_irregular.max_degrees,
+            )?;
+            if c.corners > 0 {
+                writeln!(
+                    f,
+                    "  at corners of creases, where the surface is sharp, by {:.1} at most",
+                    step.normal_jump_corners.max_degrees
+                )?;
+            }
+            if c.turned_over_area > 0.0 {
+                writeln!(f, "  folded over: {:.1e} of the area", c.turned_over_area)?;
+            }
+        }
+        Ok(())
+    }
+}

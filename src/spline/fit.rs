@@ -1,0 +1,292 @@
+//! The control points whose limit surface is nearest to samples of a surface.
+//!
+//! *Enters:* a control mesh and samples with their places. *Leaves:* control points, and the samples at the places nearest to them. Σ area · |surface − sample|² and a little of the squares of second differences of control points are minimised
+//! by one sparse Cholesky factorisation; then places are moved to the nearest points of that surface, and so on (M. Halstead, M. Kass, T. DeRose 1993 for limit positions; J. Hoschek 1988 for places). *Guaranteed:* the same bytes for any number of threads.
+
+use super::cage::{Cage, Kind};
+use super::error::SplineError;
+use super::evaluator::Evaluator;
+use super::gridded::Sample;
+use super::limit::{Limit, Place};
+use super::measure::shape;
+use crate::flow::solve::SymmetricSolver;
+use crate::geometry::mesh::{norm, sub};
+use rayon::prelude::*;
+
+/// Weight of squares of second differences beside those of distances.
+const FAIR: f64 = 1e-6;
+/// Fits, one after each correction of places and one before.
+const ROUNDS: usize = 6;
+/// Samples this many times as far off as the root mean square count twice …
+const FAR: f64 = 4.0;
+/// … and none more often than this.
+const MOST_WEIGHT: f64 = 8.0;
+/// Where the surface folds it is made fairer by this factor, after the last round so many times at most.
+const FAIRER: f64 = 30.0;
+const MOST_SMOOTHINGS: usize = 8;
+/// Samples that are moved in one go.
+const RUN: usize = 256;
+
+/// A sum of control points that is to be small.
+struct Difference {
+    points: Vec<(u32, f64)>,
+    /// The point that it is about.
+    at: u32,
+}
+
+/// The equations of a control mesh.
+pub struct Fitter<'a> {
+    cage: &'a Cage,
+    evaluator: &'a Evaluator,
+    solver: SymmetricSolver,
+    differences: Vec<Difference>,
+    /// Of each point, how many times the usual weight its differences have.
+    fairness: Vec<f64>,
+}
+
+/// What a cell adds: products of weights, and of weights with samples.
+#[derive(Default)]
+struct Block {
+    normal: Vec<f64>,
+    right: Vec<[f64; 3]>,
+}
+
+impl<'a> Fitter<'a> {
+    /// Prepares the pattern.
+    ///
+    /// # Errors
+    /// Too little memory.
+    pub fn new(cage: &'a Cage, evaluator: &'a Evaluator) -> Result<Self, SplineError> {
+        let differences = differences(cage);
+        let mut pairs = Vec::new();
+        for cell in 0..cage.cells.len() as u32 {
+            let points = evaluator.points(cell);
+            for (i, &a) in points.iter().enumerate() {
+                pairs.extend(points[..i].iter().map(|&b| [a, b]));
+            }
+        }
+        for difference in &differences {
+            let points = &difference.points;
+            for (i, &(a, _)) in points.iter().enumerate() {
+                pairs.extend(points[..i].iter().map(|&(b, _)| [a, b]));
+            }
+        }
+        Ok(Self {
+            solver: SymmetricSolver::new(cage.vertices, &pairs)?,
+            fairness: vec![1.0; cage.vertices],
+            cage,
+            evaluator,
+            differences,
+        })
+    }
+
+    /// Control points for samples at their places.
+    ///
+    /// # Errors
+    /// Equations without solution.
+    pub fn solve(&mut self, samples: &[Sample]) -> Result<Vec<[f64; 3]>, SplineError> {
+        let cells = self.cage.cells.len();
+        let mut first = vec![0usize; cells + 1];
+        samples.iter().for_each(|s| first[s.cell as usize + 1] += 1);
+        (0..cells).for_each(|c| first[c + 1] += first[c]);
+        let mut next = first.clone();
+        let mut order = vec![0u32; samples.len()];
+        for (i, sample) in samples.iter().enumerate() {
+            let at = &mut next[sample.cell as usize];
+            order[*at] = i as u32;
+            *at += 1;
+        }
+        let blocks: Vec<Block> = (0..cells as u32)
+            .into_par_iter()
+            .map(|cell| {
+                let own = &order[first[cell as usize]..first[cell as usize + 1]];
+                self.block(cell, own.iter().map(|&i| &samples[i as usize]))
+            })
+            .collect();
+        let size = self.cage.vertices;
+        let area: f64 = samples.iter().map(|s| s.area).sum();
+        let fair = FAIR * area / size as f64;
+        // Nothing is left undetermined where no sample is.
+        let mut diagonal = vec![1e-9 * fair; size];
+        let mut right = vec![0.0; 3 * size];
+        let mut off = Vec::new();
+        for (cell, block) in blocks.iter().enumerate() {
+            let points = self.evaluator.points(cell as u32);
+            let n = points.len();
+            for (i, &a) in points.iter().enumerate() {
+                diagonal[a as usize] += block.normal[i * n + i];
+                off.extend_from_slice(&block.normal[i * n..i * n + i]);
+                for (c, x) in block.right[i].iter().enumerate() {
+                    right[c * size + a as usize] += x;
+                }
+            }
+        }
+        for difference in &self.differences {
+            let weight = fair * self.fairness[difference.at as usize];
+            let points = &difference.points;
+            for (i, &(a, x)) in points.iter().enumerate() {
+                diagonal[a as usize] += weight * x * x;
+                off.extend(points[..i].iter().map(|&(_, y)| weight * x * y));
+            }
+        }
+        self.solver.factorize(&diagonal, &off)?;
+        self.solver.solve(&mut right);
+        Ok((0..size)
+            .map(|v| [0, 1, 2].map(|c| right[c * size + v]))
+            .collect())
+    }
+
+    fn block<'s>(&self, cell: u32, samples: impl Iterator<Item = &'s Sample>) -> Block {
+        let n = self.evaluator.points(cell).len();
+        let mut block = Block {
+            normal: vec![0.0; n * n],
+            right: vec![[0.0; 3]; n],
+        };
+        for sample in samples {
+            let value = &self.evaluator.value(cell, sample.at);
+            for (i, x) in value.iter().enumerate() {
+                let x = sample.area * sample.weight * x;
+                for (sum, y) in block.normal[i * n..=i * n + i].iter_mut().zip(value) {
+                    *sum += x * y;
+                }
+                for (sum, y) in block.right[i].iter_mut().zip(sample.point) {
+                    *sum += x * y;
+                }
+            }
+        }
+        block
+    }
+
+    /// Makes the surface of cells fairer: at their corners, or at all points that they depend on.
+    fn smooth(&mut self, cells: &[u32], is_wide: bool) {
+        let mut is_near = vec![false; self.cage.vertices];
+        for &cell in cells {
+            let points = match is_wide {
+                true => self.evaluator.points(cell),
+                false => &self.cage.cells[cell as usize],
+            };
+            points.iter().for_each(|&v| is_near[v as usize] = true);
+        }
+        let near = self
+            .fairness
+            .iter_mut()
+            .zip(&is_near)
+            .filter(|(_, near)| **near);
+        near.for_each(|(fairness, _)| *fairness *= FAIRER);
+    }
+
+    /// Fits, and moves the places of samples to the nearest points, in turn; samples that are far off count more in later rounds. Where a cell folds, samples stay where the map has them, and
+    /// where it still does it is made fairer.
+    ///
+    /// # Errors
+    /// Equations without solution.
+    pub fn fit(&mut self, samples: &mut [Sample]) -> Result<Vec<[f64; 3]>, SplineError> {
+        let given: Vec<Place> = samples.iter().map(Sample::place).collect();
+        let mut folds = vec![0usize; self.cage.cells.len()];
+        let mut control = self.solve(samples)?;
+        for round in 1..ROUNDS + MOST_SMOOTHINGS {
+            let limit = Limit::new(self.cage, self.evaluator, &control);
+            let folded = if round > 1 {
+                shape(&limit).1
+            } else {
+                Vec::new()
+            };
+            if round >= ROUNDS && folded.is_empty() {
+                break;
+            }
+            folded.iter().for_each(|&cell| folds[cell as usize] += 1);
+            if round < ROUNDS {
+                move_places(&limit, samples);
+                weigh(&limit, samples);
+            }
+            for (sample, place) in samples.iter_mut().zip(&given) {
+                if [place.cell, sample.cell]
+                    .iter()
+                    .any(|&cell| folds[cell as usize] > 0)
+                {
+                    (sample.cell, sample.at, sample.weight) = (place.cell, place.at, 1.0);
+                }
+            }
+            let again: Vec<u32> = folded
+                .into_iter()
+                .filter(|&cell| folds[cell as usize] > 1)
+                .collect();
+            self.smooth(&again, round > ROUNDS + 1);
+            control = self.solve(samples)?;
+        }
+        move_places(&Limit::new(self.cage, self.evaluator, &control), samples);
+        Ok(control)
+    }
+}
+
+/// Weights of samples for the next fit: more where they are far off.
+fn weigh(limit: &Limit<'_>, samples: &mut [Sample]) {
+    let off: Vec<f64> = samples
+        .par_iter()
+        .map(|s| norm(sub(limit.at(s.cell, s.at).point, s.point)))
+        .collect();
+    let area: f64 = samples.iter().map(|s| s.area).sum();
+    let squares: f64 = samples.iter().zip(&off).map(|(s, d)| s.area * d * d).sum();
+    let large = FAR * (squares / area).sqrt();
+    if large > 0.0 {
+        for (sample, d) in samples.iter_mut().zip(&off) {
+            sample.weight = (1.0 + (d / large).powi(2)).min(MOST_WEIGHT);
+        }
+    }
+}
+
+/// Moves the places of samples to the nearest points of a surface.
+pub fn move_places(limit: &Limit<'_>, samples: &mut [Sample]) {
+    samples.par_chunks_mut(RUN).for_each(|run| {
+        for sample in run {
+            let place = limit.nearest(sample.point, sample.place());
+            (sample.cell, sample.at) = (place.cell, place.at);
+        }
+    });
+}
+
+/// Second differences along both lines through a regular point, along a crease, and from the mean of the neighbours of an irregular point.
+fn differences(cage: &Cage) -> Vec<Difference> {
+    let kinds = cage.kinds();
+    let mut all = Vec::new();
+    for (v, side) in cage.leaving().into_iter().enumerate() {
+        let Some(side) = side else { continue };
+        let at = v as u32;
+        let star = cage.star(side);
+        let end = |&(c, k): &(u32, u8)| cage.cells[c as usize][usize::from((k + 1) & 3)];
+        let second = |a: u32, b: u32| Difference {
+            points: vec![(at, -2.0), (a, 1.0), (b, 1.0)],
+            at,
+        };
+        match kinds[v] {
+            Kind::Smooth if star.len() == 4 => {
+                all.push(second(end(&star[0]), end(&star[2])));
+                all.push(second(end(&star[1]), end(&star[3])));
+            }
+            Kind::Smooth | Kind::Dart => {
+                let part = 1.0 / star.len() as f64;
+                let mut points: Vec<(u32, f64)> = star.iter().map(|s| (end(s), part)).collect();
+                points.push((at, -1.0));
+                all.push(Difference { points, at });
+            }
+            Kind::Crease => {
+                let mut ends: Vec<u32> = star
+                    .iter()
+                    .filter(|&&s| cage.is_crease(s))
+                    .map(end)
+                    .collect();
+                if let Some(&(c, k)) = star
+                    .last()
+                    .filter(|&&(c, k)| cage.across[c as usize][usize::from((k + 3) & 3)].is_none())
+                {
+                    ends.push(cage.cells[c as usize][usize::from((k + 3) & 3)]);
+                }
+                if let [a, b] = ends[..] {
+                    all.push(second(a, b));
+                }
+            }
+            Kind::Corner => {}
+        }
+    }
+    all
+}

@@ -1,0 +1,376 @@
+//! A surface on the cells of its grid: the control mesh that a spline surface begins with, and samples of the surface with their places in its cells.
+//!
+//! *Enters:* [`Gridded`]: faces with coordinates in blocks of cells, and the quad mesh. *Leaves:* a [`Cage`] with the quad mesh's points, its creases where edges of the surface that are sharp lie along edges of cells; and [`Sample`]s.
+
+use super::cage::{Cage, CellSide};
+use super::error::SplineError;
+use super::limit::Place;
+use crate::geometry::disjoint_sets::UnionFind;
+use crate::geometry::mesh::{cross, dot, norm, sub};
+use rustc_hash::{FxHashMap, FxHashSet};
+
+/// A surface and its grid, as a folder has them.
+#[derive(Clone, Debug)]
+pub struct Gridded {
+    /// Vertices, source units.
+    pub positions: Vec<[f64; 3]>,
+    /// Faces, counterclockwise.
+    pub faces: Vec<[u32; 3]>,
+    /// Block of each.
+    pub block: Vec<u32>,
+    /// Corners in the coordinates of the block, in cells.
+    pub uv: Vec<[[f64; 2]; 3]>,
+    /// Points of the quad mesh, source units.
+    pub points: Vec<[f64; 3]>,
+    /// Cells: corners, counterclockwise from that at the cell's column and row.
+    pub cells: Vec<[u32; 4]>,
+    /// Block of each.
+    pub cell_block: Vec<u32>,
+    /// Column and row of each.
+    pub cell_at: Vec<[u32; 2]>,
+}
+
+/// A point of the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// In space.
+    pub point: [f64; 3],
+    /// Unit normal, interpolated but across sharp edges.
+    pub normal: [f64; 3],
+    /// Area that it stands for.
+    pub area: f64,
+    /// How often it counts.
+    pub weight: f64,
+    /// Its cell.
+    pub cell: u32,
+    /// Where in it.
+    pub at: [f64; 2],
+}
+
+impl Sample {
+    /// Where it lies.
+    pub fn place(&self) -> Place {
+        Place {
+            cell: self.cell,
+            at: self.at,
+        }
+    }
+}
+
+/// An edge of cells is a crease where sharp edges cover this part of it.
+const COVERED: f64 = 0.9;
+/// Angles of creases, radians: 40° for the most part, 20° all along.
+const SHARP: f64 = 40.0 * std::f64::consts::PI / 180.0;
+const BLUNT: f64 = SHARP / 2.0;
+/// Creases that hang together have as many edges of cells, at least.
+const SHORTEST_NET: usize = 8;
+/// Creases that end inside have as many edges of cells, at least.
+const SHORTEST_CREASE: usize = 4;
+/// Faces are divided into parts that are no longer, cells.
+const PART: f64 = 0.75;
+/// One sample does for faces that are no longer, cells.
+const SMALL: f64 = 0.25;
+/// Parts along a side of a face, at most.
+const MOST_PARTS: f64 = 64.0;
+/// How far from a line of the grid an edge that lies on it may be, cells.
+const ON_LINE: f64 = 1e-9;
+
+/// Cells by block, column and row.
+struct Cells(FxHashMap<(u32, [u32; 2]), u32>);
+
+impl Cells {
+    fn new(gridded: &Gridded) -> Self {
+        let at = gridded.cell_block.iter().zip(&gridded.cell_at).zip(0..);
+        Self(at.map(|((&b, &at), c)| ((b, at), c)).collect())
+    }
+
+    /// The cell that has a point, and the place in it; one on the border of the block belongs to the cell inside.
+    fn find(&self, block: u32, p: [f64; 2]) -> Option<(u32, [f64; 2])> {
+        let floor = p.map(|x| x.floor().max(0.0) as u32);
+        // At the far sides of a block the cell is the one before.
+        for back in [[0, 0], [1, 0], [0, 1], [1, 1]] {
+            let at = [0, 1].map(|i| floor[i].wrapping_sub(back[i]));
+            if let Some(&cell) = self.0.get(&(block, at)) {
+                let inside = [0, 1].map(|i| (p[i] - f64::from(at[i])).clamp(0.0, 1.0));
+                return Some((cell, inside));
+            }
+        }
+        None
+    }
+}
+
+impl Gridded {
+    /// Least and greatest coordinates of vertices.
+    pub fn bounds(&self) -> ([f64; 3], [f64; 3]) {
+        let none = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        self.positions.iter().fold(none, |(low, high), p| {
+            let of = |f: fn(f64, f64) -> f64, a: [f64; 3]| std::array::from_fn(|i| f(a[i], p[i]));
+            (of(f64::min, low), of(f64::max, high))
+        })
+    }
+
+    /// The same elsewhere in space.
+    pub fn moved(&self, by: [f64; 3]) -> Self {
+        let mut moved = self.clone();
+        for p in moved.positions.iter_mut().chain(&mut moved.points) {
+            *p = std::array::from_fn(|i| p[i] + by[i]);
+        }
+        moved
+    }
+
+    /// The control mesh, its points those of the quad mesh. Edges of cells along which the surface turns by more than [`SHARP`] for the most part, and by [`BLUNT`] all along, are creases.
+    ///
+    /// # Errors
+    /// Cells that make no surface.
+    pub fn cage(&self) -> Result<Cage, SplineError> {
+        let [blunt, sharp] = [BLUNT, SHARP].map(|angle| self.covered(angle));
+        let cage = |is_crease: &dyn Fn([u32; 2]) -> bool, is_corner: Vec<bool>| {
+            let at = |(c, k): CellSide| {
+                let corners = self.cells[c as usize];
+                is_crease(sorted([
+                    corners[usize::from(k)],
+                    corners[usize::from((k + 1) & 3)],
+                ]))
+            };
+            Cage::new(self.points.len(), self.cells.clone(), at, is_corner)
+        };
+        let none = || vec![false; self.points.len()];
+        let part = |covered: &FxHashMap<[u32; 2], f64>, ends: [u32; 2]| {
+            covered.get(&ends).copied().unwrap_or(0.0)
+        };
+        let all = cage(&|ends| part(&blunt, ends) >= COVERED, none())?;
+        // Chains that are sharp for the most part, and long enough not to be noise if they end inside.
+        let steps = |chain: &[u32]| -> Vec<[u32; 2]> {
+            chain.windows(2).map(|w| sorted([w[0], w[1]])).collect()
+        };
+        let mut kept: Vec<Vec<u32>> = all.chains();
+        kept.retain(|chain| {
+            let steps = steps(chain);
+            2.0 * steps.iter().map(|&s| part(&sharp, s)).sum::<f64>() >= steps.len() as f64
+        });
+        let mut edges: FxHashSet<[u32; 2]> = kept.iter().flat_map(|chain| steps(chain)).collect();
+        let chains = cage(&|ends| edges.contains(&ends), none())?;
+        kept = chains.chains();
+        kept.retain(|chain| {
+            let ends = [chain[0], chain[chain.len() - 1]];
+            let goes_on = ends.iter().all(|&v| chains.is_corner[v as usize]) || ends[0] == ends[1];
+            goes_on || chain.len() > SHORTEST_CREASE
+        });
+        // And what hangs together is longer than around two cells.
+        let mut sets = UnionFind::new(self.points.len());
+        kept.iter().for_each(|chain| {
+            chain.windows(2).for_each(|w| {
+                sets.join(w[0] as usize, w[1] as usize);
+            })
+        });
+        let mut length = vec![0; self.points.len()];
+        for chain in &kept {
+            length[sets.find(chain[0] as usize)] += chain.len() - 1;
+        }
+        let border = chains.leaving();
+        let is_on_border = |v: u32| {
+            border[v as usize].is_some_and(|side| chains.turn_back(chains.star(side)[0]).is_none())
+        };
+        let touches: FxHashSet<usize> = kept
+            .iter()
+            .flatten()
+            .filter(|&&v| is_on_border(v))
+            .map(|&v| sets.find(v as usize))
+            .collect();
+        kept.retain(|chain| {
+            let set = sets.find(chain[0] as usize);
+            length[set] >= SHORTEST_NET || touches.contains(&set)
+        });
+        edges = kept.iter().flat_map(|chain| steps(chain)).collect();
+        // Where the limit surface would have no tangent plane, creases end an edge before.
+        loop {
+            let found = cage(&|ends| edges.contains(&ends), none())?;
+            let untidy = found.untidy_creases();
+            if untidy.is_empty() {
+                let is_corner = found.turns_around_cells();
+                return cage(&|ends| edges.contains(&ends), is_corner);
+            }
+            for side in untidy {
+                edges.remove(&sorted([
+                    found.tail(side),
+                    found.tail((side.0, side.1 + 1)),
+                ]));
+            }
+        }
+    }
+
+    /// Of edges of cells by their ends, the part of each that sharp edges of the surface cover.
+    fn covered(&self, sharp: f64) -> FxHashMap<[u32; 2], f64> {
+        let cells = Cells::new(self);
+        let normals: Vec<[f64; 3]> = self.faces.iter().map(|f| self.doubled(f)).collect();
+        let mut beside: FxHashMap<[u32; 2], u32> = FxHashMap::default();
+        let mut covered: FxHashMap<[u32; 2], f64> = FxHashMap::default();
+        for (f, corners) in self.faces.iter().enumerate() {
+            for k in 0..3 {
+                let [a, b] = [corners[k], corners[(k + 1) % 3]];
+                beside.insert([a, b], f as u32);
+                let Some(&other) = beside.get(&[b, a]) else {
+                    continue;
+                };
+                let (m, n) = (normals[f], normals[other as usize]);
+                if norm(cross(m, n)).atan2(dot(m, n)) <= sharp {
+                    continue;
+                }
+                let [p, q] = [self.uv[f][k], self.uv[f][(k + 1) % 3]];
+                if let Some((ends, part)) = self.on_line(&cells, self.block[f], p, q) {
+                    *covered.entry(ends).or_default() += part;
+                }
+            }
+        }
+        covered
+    }
+
+    /// The edge of cells that a segment in a block lies on, and how much of it that is.
+    fn on_line(
+        &self,
+        cells: &Cells,
+        block: u32,
+        p: [f64; 2],
+        q: [f64; 2],
+    ) -> Option<([u32; 2], f64)> {
+        let on = |i: usize| {
+            let line = p[i].round();
+            (p[i] - line).abs() <= ON_LINE && (q[i] - line).abs() <= ON_LINE
+        };
+        let along = match (on(0), on(1)) {
+            (true, false) => 1,
+            (false, true) => 0,
+            _ => return None,
+        };
+        let middle = [0, 1].map(|i| (p[i] + q[i]) / 2.0);
+        let (cell, at) = cells.find(block, middle)?;
+        let corners = self.cells[cell as usize];
+        let far = at[1 - along] > 0.5;
+        let ends = match (along, far) {
+            (0, false) => [0, 1],
+            (0, true) => [3, 2],
+            (_, false) => [0, 3],
+            (_, true) => [1, 2],
+        };
+        let [a, b] = ends.map(|k: usize| corners[k]);
+        Some(([a.min(b), a.max(b)], (p[along] - q[along]).abs()))
+    }
+
+    /// Of the corners of faces, means of the normals of the faces around a vertex, by area; of those that lie within [`SHARP`] of the face.
+    fn normals(&self) -> Vec<[[f64; 3]; 3]> {
+        let doubled: Vec<[f64; 3]> = self.faces.iter().map(|f| self.doubled(f)).collect();
+        let mut first = vec![0usize; self.positions.len() + 1];
+        self.faces
+            .iter()
+            .flatten()
+            .for_each(|&v| first[v as usize + 1] += 1);
+        (0..self.positions.len()).for_each(|v| first[v + 1] += first[v]);
+        let mut next = first.clone();
+        let mut around = vec![0u32; 3 * self.faces.len()];
+        for (f, corners) in self.faces.iter().enumerate() {
+            for &v in corners {
+                around[next[v as usize]] = f as u32;
+                next[v as usize] += 1;
+            }
+        }
+        let least = SHARP.cos();
+        let at = |f: usize, v: u32| {
+            let own = doubled[f];
+            let mut sum = own;
+            for &g in &around[first[v as usize]..first[v as usize + 1]] {
+                let other = doubled[g as usize];
+                if g as usize != f && dot(own, other) > least * norm(own) * norm(other) {
+                    (0..3).for_each(|i| sum[i] += other[i]);
+                }
+            }
+            let length = norm(sum);
+            // A face without area has no samples.
+            sum.map(|x| if length > 0.0 { x / length } else { 0.0 })
+        };
+        self.faces
+            .iter()
+            .enumerate()
+            .map(|(f, corners)| corners.map(|v| at(f, v)))
+            .collect()
+    }
+
+    /// Twice the area, along the normal.
+    fn doubled(&self, corners: &[u32; 3]) -> [f64; 3] {
+        let [a, b, c] = corners.map(|v| self.positions[v as usize]);
+        cross(sub(b, a), sub(c, a))
+    }
+
+    /// Samples of every face: one, three of a larger one, and three of each part of one that is large beside cells; by number of the face.
+    ///
+    /// # Errors
+    /// Faces outside the cells of their block.
+    pub fn samples(&self) -> Result<Vec<Sample>, SplineError> {
+        let cells = Cells::new(self);
+        let normals = self.normals();
+        let mut samples = Vec::with_capacity(3 * self.faces.len());
+        for (face, corners) in self.faces.iter().enumerate() {
+            let (uv, block) = (self.uv[face], self.block[face]);
+            let area = norm(self.doubled(corners)) / 2.0;
+            if area <= 0.0 {
+                continue;
+            }
+            let longest = (0..3).map(|k| {
+                let [p, q] = [uv[k], uv[(k + 1) % 3]];
+                (p[0] - q[0]).hypot(p[1] - q[1])
+            });
+            let longest = longest.fold(0.0, f64::max);
+            let parts = (longest / PART).ceil().clamp(1.0, MOST_PARTS) as usize;
+            let is_small = longest <= SMALL;
+            let count = if is_small { 1 } else { 3 * parts * parts };
+            let place = corners.map(|v| self.positions[v as usize]);
+            let middle = is_small.then_some([1.0 / 3.0; 3]);
+            let inside = places(parts).take(if is_small { 0 } else { count });
+            for weights in middle.into_iter().chain(inside) {
+                let at = [0, 1].map(|i| (0..3).map(|k| weights[k] * uv[k][i]).sum());
+                let (cell, at) =
+                    cells
+                        .find(block, at)
+                        .ok_or(SplineError::Place { face, block, at })?;
+                let mixed = |of: &[[f64; 3]; 3]| -> [f64; 3] {
+                    [0, 1, 2].map(|i| (0..3).map(|k| weights[k] * of[k][i]).sum())
+                };
+                let normal = mixed(&normals[face]);
+                let length = norm(normal);
+                samples.push(Sample {
+                    point: mixed(&place),
+                    normal: normal.map(|x| x / length),
+                    area: area / count as f64,
+                    weight: 1.0,
+                    cell,
+                    at,
+                });
+            }
+        }
+        Ok(samples)
+    }
+}
+
+fn sorted([a, b]: [u32; 2]) -> [u32; 2] {
+    [a.min(b), a.max(b)]
+}
+
+/// Places of three samples in each of parts² equal parts of a triangle, by barycentric coordinates; quadratic functions are integrated exactly (Strang and Fix 1973).
+fn places(parts: usize) -> impl Iterator<Item = [f64; 3]> {
+    let step = 1.0 / parts as f64;
+    let up = (0..parts).flat_map(move |i| (0..parts - i).map(move |j| (i, j, true)));
+    let down = (0..parts)
+        .flat_map(move |i| (0..(parts - i).saturating_sub(1)).map(move |j| (i, j, false)));
+    up.chain(down).flat_map(move |(i, j, is_up)| {
+        [0, 1, 2].map(|k| {
+            let mut w = [1.0 / 6.0; 3];
+            w[k] = 2.0 / 3.0;
+            // The second and third coordinate; the first is what is left.
+            let [x, y] = match is_up {
+                true => [i as f64 + w[1], j as f64 + w[2]],
+                false => [(i + 1) as f64 - w[1], (j + 1) as f64 - w[2]],
+            };
+            let (b, c) = (x * step, y * step);
+            [1.0 - b - c, b, c]
+        })
+    })
+}

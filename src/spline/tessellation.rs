@@ -1,0 +1,162 @@
+//! The limit surface as triangles.
+//!
+//! *Enters:* a [`Limit`] surface and a number of parts along a side of a cell. *Leaves:* [`Triangles`]: points that cells share along their sides, and normals that they share but across creases.
+
+use super::cage::{Cage, CellSide};
+use super::evaluator::CORNER;
+use super::limit::Limit;
+use crate::geometry::mesh::norm;
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+
+/// Triangles on the surface.
+#[derive(Clone, Debug, Default)]
+pub struct Tessellation {
+    /// Points.
+    pub points: Vec<[f64; 3]>,
+    /// Faces by points, counterclockwise; two a part of a cell, cell by cell and row by row.
+    pub faces: Vec<[u32; 3]>,
+    /// Of every vertex of the next, its point and its unit normal.
+    pub vertices: Vec<(u32, [f64; 3])>,
+    /// The same faces by vertices.
+    pub smooth_faces: Vec<[u32; 3]>,
+    /// Parts along a side of a cell.
+    pub parts: usize,
+}
+
+/// A place that cells share.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum Name {
+    Point(u32),
+    /// The first side of an edge, and how far along it.
+    Edge(CellSide, usize),
+    Inside(u32, usize),
+}
+
+/// Of every corner of every cell, the first cell of those around the point that no crease divides from it.
+fn sectors(cage: &Cage) -> Vec<[u32; 4]> {
+    let mut first = vec![[u32::MAX; 4]; cage.cells.len()];
+    for c in 0..cage.cells.len() as u32 {
+        for k in 0..4u8 {
+            if first[c as usize][usize::from(k)] != u32::MAX {
+                continue;
+            }
+            let mut star = cage.star((c, k));
+            // From a crease on, where there is one.
+            let crease = star.iter().position(|&s| cage.is_crease(s));
+            star.rotate_left(crease.unwrap_or(0));
+            let mut sector: Vec<CellSide> = Vec::new();
+            let mut close = |sector: &mut Vec<CellSide>| {
+                let least = sector.iter().map(|s| s.0).min().unwrap_or(0);
+                for (c, k) in sector.drain(..) {
+                    first[c as usize][usize::from(k)] = least;
+                }
+            };
+            for side in star {
+                if cage.is_crease(side) {
+                    close(&mut sector);
+                }
+                sector.push(side);
+            }
+            close(&mut sector);
+        }
+    }
+    first
+}
+
+/// Divides every cell into `parts`² parts.
+pub fn tessellate(limit: &Limit<'_>, parts: usize) -> Tessellation {
+    let cage = limit.cage;
+    let sectors = sectors(cage);
+    let row = parts + 1;
+    let place = |i: usize| [(i % row) as f64, (i / row) as f64].map(|x| x / parts as f64);
+    let jets: Vec<Vec<([f64; 3], [f64; 3])>> = (0..cage.cells.len() as u32)
+        .into_par_iter()
+        .map(|c| (0..row * row).map(|i| limit.normal(c, place(i))).collect())
+        .collect();
+    let mut out = Tessellation {
+        parts,
+        ..Tessellation::default()
+    };
+    let mut points: FxHashMap<Name, u32> = FxHashMap::default();
+    let mut vertices: FxHashMap<(u32, u32), u32> = FxHashMap::default();
+    for c in 0..cage.cells.len() as u32 {
+        let mut numbers = vec![[0u32; 2]; row * row];
+        for (i, number) in numbers.iter_mut().enumerate() {
+            let (name, sector) = named(cage, &sectors, c, [i % row, i / row], parts);
+            let (position, normal) = jets[c as usize][i];
+            let point = *points.entry(name).or_insert_with(|| {
+                out.points.push(position);
+                out.points.len() as u32 - 1
+            });
+            let vertex = *vertices.entry((point, sector)).or_insert_with(|| {
+                out.vertices.push((point, [0.0; 3]));
+                out.vertices.len() as u32 - 1
+            });
+            // The mean of those of all cells, which differ by rounding but at irregular points.
+            (0..3).for_each(|x| out.vertices[vertex as usize].1[x] += normal[x]);
+            *number = [point, vertex];
+        }
+        for j in 0..parts {
+            for i in 0..parts {
+                let at = [
+                    j * row + i,
+                    j * row + i + 1,
+                    (j + 1) * row + i + 1,
+                    (j + 1) * row + i,
+                ];
+                for corners in [[at[0], at[1], at[2]], [at[0], at[2], at[3]]] {
+                    out.faces.push(corners.map(|i| numbers[i][0]));
+                    out.smooth_faces.push(corners.map(|i| numbers[i][1]));
+                }
+            }
+        }
+    }
+    for (_, normal) in &mut out.vertices {
+        let length = norm(*normal);
+        *normal = match length > 0.0 {
+            true => normal.map(|x| x / length),
+            false => [0.0, 0.0, 1.0],
+        };
+    }
+    out
+}
+
+/// The name of a place, and what tells its normals on both sides of a crease apart.
+fn named(
+    cage: &Cage,
+    sectors: &[[u32; 4]],
+    c: u32,
+    [i, j]: [usize; 2],
+    parts: usize,
+) -> (Name, u32) {
+    let is_end = |x: usize| x == 0 || x == parts;
+    let at = [i, j].map(|x| x as f64 / parts as f64);
+    match (is_end(i), is_end(j)) {
+        (true, true) => {
+            let k = CORNER.iter().position(|corner| *corner == at).unwrap_or(0);
+            (
+                Name::Point(cage.cells[c as usize][k]),
+                sectors[c as usize][k],
+            )
+        }
+        (false, false) => (Name::Inside(c, j * (parts + 1) + i), 0),
+        (is_left_or_right, _) => {
+            let k: u8 = match (is_left_or_right, i == 0, j == 0) {
+                (false, _, true) => 0,
+                (false, _, false) => 2,
+                (true, false, _) => 1,
+                (true, true, _) => 3,
+            };
+            let along = [i, j, parts - i, parts - j][usize::from(k)];
+            let (edge, along) = match cage.across[c as usize][usize::from(k)] {
+                Some(other) if other < (c, k) => (other, parts - along),
+                _ => ((c, k), along),
+            };
+            (
+                Name::Edge(edge, along),
+                if cage.is_crease((c, k)) { c } else { 0 },
+            )
+        }
+    }
+}
