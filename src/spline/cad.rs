@@ -17,11 +17,11 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// Halvings towards irregular points, at most.
-pub const MOST_HALVINGS: u32 = 14;
+pub const MOST_HALVINGS: u32 = 12;
 /// With less the last square of a block of one cell would be all of it.
 const LEAST_HALVINGS: u32 = 1;
-/// Normals at darts and creases, where they converge slowly, may differ by so many times as much.
-const ON_CREASE: f64 = 5.0;
+/// Normals at the last quarter of irregular points may differ by so many times as much.
+const ELSEWHERE: f64 = 5.0;
 /// Places along an edge where normals of both faces are compared, a unit of cells.
 const ALONG: usize = 8;
 
@@ -106,26 +106,38 @@ fn face(limit: &Limit<'_>, block: &Block, irregular: [bool; 4], halvings: u32) -
     surface(limit, block, irregular, [across, up])
 }
 
-/// Halvings after which normals at irregular points differ by less than `angle`, radians, or [`MOST_HALVINGS`].
+/// Halvings after which normals at three quarters of the irregular points differ by less than `angle`, radians, and at all others by less than [`ELSEWHERE`] times that; [`MOST_HALVINGS`] where there are none.
 fn halvings(limit: &Limit<'_>, irregular: &[bool], angle: f64) -> u32 {
-    let leaving = limit.cage.leaving();
-    let points: Vec<CellSide> = (0..irregular.len())
-        .filter(|&v| irregular[v])
-        .filter_map(|v| leaving[v])
+    let (leaving, kinds) = (limit.cage.leaving(), limit.cage.kinds());
+    // At corners the surface is sharp, however small the square.
+    let is_met = |v: &usize| irregular[*v] && kinds[*v] != Kind::Corner;
+    let points = (0..irregular.len()).filter(is_met);
+    let points: Vec<CellSide> = points.filter_map(|v| leaving[v]).collect();
+    let mut needed: Vec<[u32; 2]> = points
+        .par_iter()
+        .map(|&side| {
+            let mut needed = [MOST_HALVINGS; 2];
+            for d in LEAST_HALVINGS..MOST_HALVINGS {
+                let jump = jump_at(limit, side, d);
+                for (needed, most) in needed.iter_mut().zip([angle, ELSEWHERE * angle]) {
+                    if jump < most {
+                        *needed = d.min(*needed);
+                    }
+                }
+                if jump < angle {
+                    break;
+                }
+            }
+            needed
+        })
         .collect();
-    let kinds = limit.cage.kinds();
-    let needed = points.par_iter().map(|&side| {
-        let enough = match kinds[limit.cage.tail(side) as usize] {
-            Kind::Smooth => angle,
-            Kind::Dart | Kind::Crease => ON_CREASE * angle,
-            // The surface is sharp there, however small the square.
-            Kind::Corner => return LEAST_HALVINGS,
-        };
-        (LEAST_HALVINGS + 1..MOST_HALVINGS)
-            .find(|&d| jump_at(limit, side, d) < enough)
-            .unwrap_or(MOST_HALVINGS)
-    });
-    needed.max().unwrap_or(0)
+    needed.sort_unstable();
+    let most = needed.iter().map(|n| n[1]).max().unwrap_or(LEAST_HALVINGS);
+    let usual = needed
+        .len()
+        .checked_sub(1)
+        .map(|last| needed[last * 3 / 4][0]);
+    most.max(usual.unwrap_or(LEAST_HALVINGS))
 }
 
 /// The largest angle between normals across edges at an irregular point.
