@@ -88,7 +88,7 @@ fn beside(mesh: &Path, files: &[String]) -> Result<(), Box<dyn Error>> {
         );
         let control = Fitter::new(&cage, &evaluator)?.fit(&mut samples)?;
         let limit = Limit::new(&cage, &evaluator, &control);
-        let (errors, shape) = (errors(&limit, &samples), shape(&limit).0);
+        let (errors, shape) = (errors(&limit, &samples), shape(&limit, &samples).0);
         println!(
             "{file} | {} | {} | {:.2e} | {:.2e} | {:.2} | {:.1e}",
             cage.cells.len(),
@@ -127,12 +127,18 @@ fn sharp(points: &[[f64; 3]], cells: &[[u32; 4]]) -> Vec<[bool; 4]> {
         .collect()
 }
 
+/// A place with its point and normal.
+type Near = (Place, [f64; 3], [f64; 3]);
+
+/// Points and quads.
+type QuadMesh = (Vec<[f64; 3]>, Vec<[u32; 4]>);
+
 /// Nearest places: of the nearest points of a tessellation whose normals agree, then on the surface.
 fn place(limit: &Limit<'_>, samples: &mut [Sample], diagonal: f64) {
     const PARTS: usize = 4;
     let size = diagonal / 100.0;
     let bin = |p: [f64; 3]| p.map(|x| (x / size).floor() as i64);
-    let mut bins: HashMap<[i64; 3], Vec<(Place, [f64; 3], [f64; 3])>> = HashMap::new();
+    let mut bins: HashMap<[i64; 3], Vec<Near>> = HashMap::new();
     let at = |i: usize| [i % PARTS, i / PARTS].map(|x| (x as f64 + 0.5) / PARTS as f64);
     for cell in 0..limit.cage.cells.len() as u32 {
         for i in 0..PARTS * PARTS {
@@ -182,7 +188,7 @@ fn place(limit: &Limit<'_>, samples: &mut [Sample], diagonal: f64) {
 }
 
 /// Points and quads of an OBJ; polygons that are none are refused.
-fn quads(path: &Path) -> Result<(Vec<[f64; 3]>, Vec<[u32; 4]>), Box<dyn Error>> {
+fn quads(path: &Path) -> Result<QuadMesh, Box<dyn Error>> {
     let (mut points, mut cells) = (Vec::new(), Vec::new());
     for line in std::fs::read_to_string(path)?.lines() {
         let mut words = line.split_whitespace();

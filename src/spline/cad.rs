@@ -47,7 +47,7 @@ pub enum Beside {
     Regular,
     /// An irregular point, or the end of a crease.
     Irregular,
-    /// A corner.
+    /// A corner, or a point with three cells or more between two creases.
     Corner,
 }
 
@@ -206,6 +206,14 @@ fn joined(
         at: vertex,
     } = join_corners(cage, blocks, &mut surfaces);
     let kinds = cage.kinds();
+    // There the limit surface has no tangent plane, or comes near it slowly.
+    let sectors = cage
+        .leaving()
+        .into_iter()
+        .map(|side| side.map_or_else(Vec::new, |s| cage.sectors(s)));
+    let is_wide: Vec<bool> = sectors
+        .map(|sectors| sectors.iter().any(|&cells| cells > 2))
+        .collect();
     let touched = |(c, k): CellSide| {
         let across = cage.across[c as usize][usize::from(k)];
         let cells = [Some(c), across.map(|other| other.0)];
@@ -215,6 +223,7 @@ fn joined(
             .flat_map(|c| cage.cells[c as usize]);
         let of = |v: u32| match (kinds[v as usize], irregular[v as usize]) {
             (Kind::Corner, _) => Beside::Corner,
+            (Kind::Crease, true) if is_wide[v as usize] => Beside::Corner,
             (_, true) => Beside::Irregular,
             _ => Beside::Regular,
         };

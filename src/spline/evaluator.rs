@@ -205,7 +205,7 @@ impl Evaluator {
         path: &mut [(u32, u8); MOST_DEPTH],
     ) -> (usize, u32, [f64; 2], bool) {
         let (mut node, mut at) = (root, place);
-        for depth in 0..most {
+        for (depth, step) in path.iter_mut().enumerate().take(most) {
             let own = &self.nodes[node as usize];
             if own.regular.is_some() {
                 return (depth, node, at, false);
@@ -221,7 +221,7 @@ impl Evaluator {
                 let low = CORNER[quarter];
                 inside = [0, 1].map(|i| (2.0 * at[i] - low[i]).clamp(0.0, 1.0));
             }
-            path[depth] = (node, quarter as u8);
+            *step = (node, quarter as u8);
             (node, at) = (own.quarters[quarter].0, inside);
             if is_last {
                 return (most, node, at, true);
@@ -347,10 +347,10 @@ impl Piece {
         for (i, p) in self.control.iter().enumerate() {
             let (x, y) = (i % 4, i / 4);
             let w = [s[0][x] * t[0][y], s[1][x] * t[0][y], s[0][x] * t[1][y]];
-            for c in 0..3 {
-                jet.point[c] += w[0] * p[c];
-                jet.tangent[0][c] += w[1] * p[c];
-                jet.tangent[1][c] += w[2] * p[c];
+            for (c, x) in p.iter().enumerate() {
+                jet.point[c] += w[0] * x;
+                jet.tangent[0][c] += w[1] * x;
+                jet.tangent[1][c] += w[2] * x;
             }
         }
         jet.tangent = jet.tangent.map(|d| d.map(|x| x / self.side));

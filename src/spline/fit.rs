@@ -184,19 +184,22 @@ impl<'a> Fitter<'a> {
         let given: Vec<Place> = samples.iter().map(Sample::place).collect();
         let mut folds = vec![0usize; self.cage.cells.len()];
         let mut control = self.solve(samples)?;
-        for round in 1..ROUNDS + MOST_SMOOTHINGS {
+        for round in 1..=ROUNDS + MOST_SMOOTHINGS {
             let limit = Limit::new(self.cage, self.evaluator, &control);
-            let folded = if round > 1 {
-                shape(&limit).1
-            } else {
-                Vec::new()
+            let mut moved = samples.to_vec();
+            move_places(&limit, &mut moved);
+            let folded = match round {
+                1 => Vec::new(),
+                _ => shape(&limit, &moved).1,
             };
-            if round >= ROUNDS && folded.is_empty() {
+            let is_last = round >= ROUNDS && folded.is_empty();
+            if is_last || round == ROUNDS + MOST_SMOOTHINGS {
+                samples.copy_from_slice(&moved);
                 break;
             }
             folded.iter().for_each(|&cell| folds[cell as usize] += 1);
             if round < ROUNDS {
-                move_places(&limit, samples);
+                samples.copy_from_slice(&moved);
                 weigh(&limit, samples);
             }
             for (sample, place) in samples.iter_mut().zip(&given) {
@@ -207,14 +210,10 @@ impl<'a> Fitter<'a> {
                     (sample.cell, sample.at, sample.weight) = (place.cell, place.at, 1.0);
                 }
             }
-            let again: Vec<u32> = folded
-                .into_iter()
-                .filter(|&cell| folds[cell as usize] > 1)
-                .collect();
-            self.smooth(&again, round > ROUNDS + 1);
+            let again = folded.into_iter().filter(|&cell| folds[cell as usize] > 1);
+            self.smooth(&again.collect::<Vec<u32>>(), round > ROUNDS + 1);
             control = self.solve(samples)?;
         }
-        move_places(&Limit::new(self.cage, self.evaluator, &control), samples);
         Ok(control)
     }
 }

@@ -25,7 +25,8 @@ pub struct Errors {
 pub struct Shape {
     /// Smallest |∂s × ∂t| over its mean, over the middles of [`PARTS`]² parts of every cell.
     pub least_jacobian: f64,
-    /// Part of the area where the surface is folded over itself: the normal looks away from that of the cell, and turns by more than a right angle from one part to the next.
+    /// Part of the area where the surface is folded over itself: in a cell where the normal turns by more than a right angle from one part to the next, the parts whose normal looks away from
+    /// the mean one, if they are more than those of the source that do.
     pub turned_over: f64,
 }
 
@@ -74,43 +75,78 @@ fn jacobians(limit: &Limit<'_>, cell: u32) -> Vec<[f64; 3]> {
     parts.map(of).collect()
 }
 
-/// Looks for folds, and lists the cells in which there are some.
-pub fn shape(limit: &Limit<'_>) -> (Shape, Vec<u32>) {
+/// Part of a cell by which more of the surface than of the source may look away from its mean normal.
+const AWAY: f64 = 0.05;
+
+/// Looks for folds, and lists the cells in which there are some. `samples`: of the source.
+pub fn shape(limit: &Limit<'_>, samples: &[Sample]) -> (Shape, Vec<u32>) {
     let cells = 0..limit.cage.cells.len() as u32;
-    let each: Vec<(f64, f64, f64)> = cells
+    let each: Vec<Cell> = cells
         .into_par_iter()
-        .map(|cell| {
-            let jacobians = jacobians(limit, cell);
-            let mut whole = [0.0; 3];
-            for j in &jacobians {
-                (0..3).for_each(|i| whole[i] += j[i]);
-            }
-            let sizes: Vec<f64> = jacobians.iter().map(|&j| norm(j)).collect();
-            let flips = (0..PARTS).any(|y| {
-                (0..PARTS).any(|x| {
-                    let at = |x: usize, y: usize| jacobians[PARTS * y + x];
-                    let right = x + 1 < PARTS && dot(at(x, y), at(x + 1, y)) < 0.0;
-                    right || (y + 1 < PARTS && dot(at(x, y), at(x, y + 1)) < 0.0)
-                })
-            });
-            let away = jacobians
-                .iter()
-                .zip(&sizes)
-                .filter(|(j, _)| flips && dot(**j, whole) < 0.0);
-            let least = sizes.iter().copied().fold(f64::INFINITY, f64::min);
-            (
-                sizes.iter().sum::<f64>(),
-                least,
-                away.fold(0.0, |area, (_, size)| area + size),
-            )
-        })
+        .map(|cell| Cell::new(limit, cell))
         .collect();
-    let sum: f64 = each.iter().map(|e| e.0).sum();
-    let mean = sum / (each.len() * PARTS * PARTS) as f64;
-    let folded = (0..).zip(&each).filter(|(_, e)| e.2 > 0.0);
-    let shape = Shape {
-        least_jacobian: each.iter().map(|e| e.1).fold(f64::INFINITY, f64::min) / mean,
-        turned_over: each.iter().fold(0.0, |area, e| area + e.2) / sum,
+    let mut source = vec![[0.0; 2]; each.len()];
+    for sample in samples.iter().filter(|s| each[s.cell as usize].away > 0.0) {
+        let [away, all] = &mut source[sample.cell as usize];
+        *all += sample.area;
+        if dot(sample.normal, each[sample.cell as usize].mean) < 0.0 {
+            *away += sample.area;
+        }
+    }
+    let folded = |(cell, [away, all]): &(&Cell, [f64; 2])| {
+        let bent = if *all > 0.0 { away / all } else { 0.0 };
+        cell.away > cell.area * (bent + AWAY).min(1.0)
     };
+    let sum: f64 = each.iter().map(|cell| cell.area).sum();
+    let mean = sum / (each.len() * PARTS * PARTS) as f64;
+    let least = each
+        .iter()
+        .map(|cell| cell.least)
+        .fold(f64::INFINITY, f64::min);
+    let is_folded: Vec<bool> = each.iter().zip(source).map(|pair| folded(&pair)).collect();
+    let over = each.iter().zip(&is_folded).filter(|(_, folded)| **folded);
+    let shape = Shape {
+        least_jacobian: least / mean,
+        turned_over: over.fold(0.0, |area, (cell, _)| area + cell.away) / sum,
+    };
+    let folded = (0..).zip(&is_folded).filter(|(_, folded)| **folded);
     (shape, folded.map(|(cell, _)| cell).collect())
+}
+
+/// The Jacobians of a cell.
+struct Cell {
+    /// Sum of their lengths.
+    area: f64,
+    /// The least length.
+    least: f64,
+    /// Their sum.
+    mean: [f64; 3],
+    /// Sum of the lengths of those that look away from it, where some neighbours are more than a right angle apart; else 0.
+    away: f64,
+}
+
+impl Cell {
+    fn new(limit: &Limit<'_>, cell: u32) -> Self {
+        let jacobians = jacobians(limit, cell);
+        let mut mean = [0.0; 3];
+        for j in &jacobians {
+            (0..3).for_each(|i| mean[i] += j[i]);
+        }
+        let sizes: Vec<f64> = jacobians.iter().map(|&j| norm(j)).collect();
+        let at = |x: usize, y: usize| jacobians[PARTS * y + x];
+        let flips = (0..PARTS).any(|y| {
+            (0..PARTS).any(|x| {
+                let right = x + 1 < PARTS && dot(at(x, y), at(x + 1, y)) < 0.0;
+                right || (y + 1 < PARTS && dot(at(x, y), at(x, y + 1)) < 0.0)
+            })
+        });
+        let away = jacobians.iter().zip(&sizes);
+        let away = away.filter(|(j, _)| flips && dot(**j, mean) < 0.0);
+        Self {
+            area: sizes.iter().sum(),
+            least: sizes.iter().copied().fold(f64::INFINITY, f64::min),
+            away: away.fold(0.0, |sum, (_, size)| sum + size),
+            mean,
+        }
+    }
 }

@@ -272,29 +272,12 @@ impl Rings {
             let pair = near.as_ref()?.iter().zip(next.as_ref()?);
             Some(pair.map(|(a, b)| 2.0 * a - b).collect())
         };
-        for x in 0..4 {
-            if at[0][x].is_none() {
-                at[0][x] = mirrored(&at[1][x], &at[2][x]);
-            }
-            if at[3][x].is_none() {
-                at[3][x] = mirrored(&at[2][x], &at[1][x]);
-            }
-        }
-        for row in &mut at {
-            if row[0].is_none() {
-                row[0] = mirrored(&row[1], &row[2]);
-            }
-            if row[3].is_none() {
-                row[3] = mirrored(&row[2], &row[1]);
-            }
-        }
-        // Corners of the grid that were mirrored before their neighbours were known.
-        for y in [0, 3] {
-            for x in [0, 3] {
-                if at[y][x].is_none() {
-                    let (near, next) = if y == 0 { (1, 2) } else { (2, 1) };
-                    at[y][x] = mirrored(&at[near][x], &at[next][x]);
-                }
+        // First whole rows, then columns, whose ends may be in these.
+        let rows = (0..4).flat_map(|x| [[[0, x], [1, x], [2, x]], [[3, x], [2, x], [1, x]]]);
+        let columns = (0..4).flat_map(|y| [[[y, 0], [y, 1], [y, 2]], [[y, 3], [y, 2], [y, 1]]]);
+        for [far, near, next] in rows.chain(columns) {
+            if at[far[0]][far[1]].is_none() {
+                at[far[0]][far[1]] = mirrored(&at[near[0]][near[1]], &at[next[0]][next[1]]);
             }
         }
         let mut weights = vec![[0.0; 16]; self.points];

@@ -106,7 +106,7 @@ pub struct Step {
     pub normal_jump_regular: JumpDegrees,
     /// The same beside irregular points and where creases end.
     pub normal_jump_irregular: JumpDegrees,
-    /// The same at corners, where the surface itself is sharp.
+    /// The same at corners, where the surface itself is sharp, and where three cells or more lie between two creases.
     pub normal_jump_corners: JumpDegrees,
 }
 

@@ -104,7 +104,10 @@ fn table(body: &mut String, c: &Component, unit: &str) {
     for (name, jump) in [
         ("between regular cells", c.step.normal_jump_regular),
         ("beside irregular points", c.step.normal_jump_irregular),
-        ("at corners of creases", c.step.normal_jump_corners),
+        (
+            "at corners and wide sides of creases",
+            c.step.normal_jump_corners,
+        ),
     ] {
         row(
             &format!("STEP: normals turn {name}, 95 % (degrees)"),

@@ -41,10 +41,10 @@ impl fmt::Display for FittedAsset {
                 step.normal_jump_irregular.p95_degrees,
                 step.normal_jump_irregular.max_degrees,
             )?;
-            if c.corners > 0 {
+            if step.normal_jump_corners.max_degrees > 0.0 {
                 writeln!(
                     f,
-                    "  at corners of creases, where the surface is sharp, by {:.1} at most",
+                    "  at corners, and where three cells or more lie between creases, by {:.1} at most",
                     step.normal_jump_corners.max_degrees
                 )?;
             }

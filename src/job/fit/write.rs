@@ -70,7 +70,7 @@ impl FittedAsset {
         };
         let unit = self.params.unit;
         file("usda", &|mut out| {
-            usd::write(&[mesh.clone()], unit.metres(), &mut out)
+            usd::write(std::slice::from_ref(&mesh), unit.metres(), &mut out)
         })?;
         let shells = [(name.clone(), &faces.shell)];
         file("step", &|mut out| step::write(&shells, unit, &mut out))?;
