@@ -425,15 +425,26 @@ fn rebuild_without_a_folder_or_a_glb() {
 #[test]
 fn fit_without_a_mesh_or_a_name() {
     let folder = folder();
-    insta::assert_snapshot!(refusal(folder.path(), &["fit", "nowhere.obj"], 1), @"");
+    insta::assert_snapshot!(refusal(folder.path(), &["fit", "nowhere.obj"], 1), @"failed: nowhere.obj (input): nowhere.obj: cannot be read (it does not exist); check that the file exists and that you may read it");
     insta::assert_snapshot!(refusal(folder.path(), &["fit", ".", "-o", ".."], 2), @r"
     error: .. does not end in the name of a folder to write
     help: name it with `--out FOLDER`
     ");
-    insta::assert_snapshot!(refusal(folder.path(), &["fit", ".", "--tolerance", "1.5"], 2), @"");
-    insta::assert_snapshot!(refusal(folder.path(), &["fit", ".", "--angle", "0"], 2), @"");
-    insta::assert_snapshot!(refusal(folder.path(), &["fit", ".", "--unit", "furlong"], 2), @"");
-    insta::assert_snapshot!(refusal(folder.path(), &["fit", ".", "--cells", "500"], 1), @"");
+    insta::assert_snapshot!(refusal(folder.path(), &["fit", ".", "--tolerance", "1.5"], 2), @r"
+    error: invalid value '1.5' for '--tolerance <DISTANCE>': it must be a part of the diagonal below 1, such as 0.001, or a length such as 0.1mm (mm, cm, m, in)
+
+    For more information, try '--help'.
+    ");
+    insta::assert_snapshot!(refusal(folder.path(), &["fit", ".", "--angle", "0"], 2), @r"
+    error: invalid value '0' for '--angle <DEGREES>': it must be a number from 0.001 to 90
+
+    For more information, try '--help'.
+    ");
+    insta::assert_snapshot!(refusal(folder.path(), &["fit", ".", "--unit", "furlong"], 2), @r"
+    error: invalid value 'furlong' for '--unit <UNIT>': it must be mm, cm, m or in
+
+    For more information, try '--help'.
+    ");
     std::fs::create_dir(folder.path().join("empty")).expect("created");
     insta::assert_snapshot!(refusal(folder.path(), &["fit", "empty"], 1), @"failed: empty (input): empty holds no atlas.json and no component-000; give the folder that `affine-atlas build` wrote for a mesh");
 }
@@ -531,7 +542,7 @@ fn schema_and_explain_refuse_what_they_do_not_know() {
     let folder = folder();
     insta::assert_snapshot!(refusal(folder.path(), &["schema", "glb"], 2), @r"
     error: invalid value 'glb' for '<FILE>'
-      [possible values: atlas, manifest, config, plan]
+      [possible values: atlas, manifest, config, plan, fit]
 
     For more information, try '--help'.
     ");

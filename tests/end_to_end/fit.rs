@@ -35,7 +35,8 @@ fn a_mesh_becomes_a_folder_of_surfaces() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut all = Vec::new();
     for threads in ["1", "2"] {
-        let into = folder.path().join(threads);
+        // The page has the name of the folder.
+        let into = folder.path().join(threads).join("surface");
         good(&fit(
             Path::new(ANIMAL),
             &into,
@@ -52,7 +53,7 @@ fn a_mesh_becomes_a_folder_of_surfaces() {
     wanted.extend(["fit.html", "fit.json"].map(str::to_owned));
     wanted.sort();
     assert_eq!(names, wanted);
-    let figures = figures(&folder.path().join("1"));
+    let figures = figures(&folder.path().join("1/surface"));
     let component = &figures["components"][0];
     assert_eq!(component["closed"], true);
     assert_eq!(component["turned_over_area"], 0.0);

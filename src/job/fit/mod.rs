@@ -186,12 +186,12 @@ fn of_spline(name: &str) -> impl Fn(SplineError) -> FitAssetError {
 }
 
 fn of_folder(folder: &Path, params: &FitParams) -> Result<Vec<(String, Spline)>, FitAssetError> {
+    let folders = component_folders(folder)?;
     if params.size != Size::Default {
         return Err(FitAssetError::HasGrid {
             path: folder.to_owned(),
         });
     }
-    let folders = component_folders(folder)?;
     let splines = folders.iter().map(|folder| {
         let name = folder_name(folder);
         let gridded = gridded(folder)?;
