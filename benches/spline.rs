@@ -15,6 +15,7 @@ use affine_atlas::spline::limit::{Limit, Place};
 use affine_atlas::spline::measure::{errors, shape};
 use affine_atlas::{job, spline};
 use common::{Arguments, Triangles, cpu_seconds};
+use rayon::prelude::*;
 use std::collections::HashMap;
 use std::error::Error;
 use std::path::Path;
@@ -65,8 +66,8 @@ fn beside(mesh: &Path, files: &[String]) -> Result<(), Box<dyn Error>> {
             positions: source.positions.clone(),
             faces: source.faces.clone(),
             block: vec![0; source.faces.len()],
-            // All of a face in one place: samples of small faces.
-            uv: vec![[[0.25, 0.25], [0.5, 0.25], [0.25, 0.5]]; source.faces.len()],
+            // As if all lay in one place of one cell: a sample a face.
+            uv: vec![[[0.25, 0.25], [0.4, 0.25], [0.25, 0.4]]; source.faces.len()],
             cell_block: vec![0; 1],
             cell_at: vec![[0; 2]; 1],
             cells: cells.clone(),
@@ -149,7 +150,7 @@ fn place(limit: &Limit<'_>, samples: &mut [Sample], diagonal: f64) {
                 .push((place, point, normal));
         }
     }
-    for sample in samples {
+    samples.par_iter_mut().for_each(|sample| {
         let middle = bin(sample.point);
         let mut best: Option<(f64, Place)> = None;
         for reach in 0..200i64 {
@@ -184,7 +185,7 @@ fn place(limit: &Limit<'_>, samples: &mut [Sample], diagonal: f64) {
             }
             (sample.cell, sample.at) = (place.cell, place.at);
         }
-    }
+    });
 }
 
 /// Points and quads of an OBJ; polygons that are none are refused.

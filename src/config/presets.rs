@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// What the atlas is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Preset {
-    /// The integer grid that `affine-atlas fit` lays its surface on.
+    /// Full grids, densely sampled, for spline fitters that take images.
     #[serde(rename = "spline-fit")]
     SplineFit,
     /// As many texels in all as a geometry image of 256 by 256 has.
@@ -40,7 +40,7 @@ impl Preset {
     #[must_use]
     pub fn settings(self) -> &'static str {
         match self {
-            Self::SplineFit => "[images]\ndomain = \"grid\"\n",
+            Self::SplineFit => "[images]\ndomain = \"grid\"\n[grid]\nsamples_per_cell = 16\n",
             // More cones vary less in scale, and one texel of padding is what bilinear interpolation needs: at so few texels each counts.
             Self::GeometryImage256 => {
                 "[cones]\ncount = 16\n[images]\ndomain = \"flat\"\nchannels = [\"normal\"]\n[patches]\n\

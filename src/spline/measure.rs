@@ -26,7 +26,7 @@ pub struct Shape {
     /// Smallest |∂s × ∂t| over its mean, over the middles of [`PARTS`]² parts of every cell.
     pub least_jacobian: f64,
     /// Part of the area where the surface is folded over itself: in a cell where the normal turns by more than a right angle from one part to the next, the parts whose normal looks away from
-    /// the mean one, if they are more than those of the source that do.
+    /// the mean one, if they are a twentieth of the cell more than those of the source that do.
     pub turned_over: f64,
 }
 

@@ -26,7 +26,7 @@ pub(super) fn of_mesh(
     path: &Path,
     params: &FitParams,
 ) -> Result<Vec<(String, Spline)>, FitAssetError> {
-    let mut keys = vec!["preset=spline-fit".to_owned()];
+    let mut keys = vec!["images.domain=grid".to_owned()];
     if let Size::Cells(cells) = params.size {
         keys.push(format!("grid.cells={cells}"));
     }
