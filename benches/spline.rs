@@ -174,7 +174,8 @@ fn place(limit: &Limit<'_>, samples: &mut [Sample], diagonal: f64) {
                     }
                 }
             }
-            if reach > 1 && best.is_some_and(|(off, _)| off.sqrt() < reach as f64 * size) {
+            // Farther away only where nothing is near.
+            if reach > 2 && best.is_some() {
                 break;
             }
         }
