@@ -17,7 +17,7 @@
 //! Every arrow is a function from finished values to a finished value; [`job`] is the page on which they
 //! stand in order. Dependencies point one way: `geometry` ← `flow` ← `atlas` ← `product` ← `report`,
 //! `export`; `read` and `repair` know `geometry` only; [`rebuild`] makes a mesh again from images and seams alone, in memory for
-//! `report` and from a folder for the command; [`fit`] makes spline surfaces of the images of a grid; [`texture`] lays an image that repeats over the surface; [`verify`] reads what was written and shares no
+//! `report` and from a folder for the command; [`spline`] fits one smooth surface to the cells of a grid; [`texture`] lays an image that repeats over the surface; [`verify`] reads what was written and shares no
 //! code with the stages that made it (but the readers of file formats in `read`). [`batch`] runs [`job`] for many assets, each in a
 //! process of its own, and knows nothing of what a job computes.
 //!

@@ -3,7 +3,7 @@
 //! *Enters:* a [`Cage`], then a cell and a place (s, t) in it: along its first side, and from that to the opposite one. *Leaves:* weights of the points and of the derivatives by s and t.
 //!
 //! A cell whose surroundings are regular is a bicubic B-spline piece. Of others the quarter that the place is in is taken, until one is regular (J. Stam 1998); what belongs to a quarter is computed once for
-//! all cells whose surroundings are alike, and a quarter at an irregular point soon is like its own. *Guaranteed:* limit positions to rounding: beside an irregular point after [`MOST_DEPTH`] halvings, by when
+//! all cells whose surroundings are alike, and a quarter at an irregular point soon is like its own. *Guaranteed:* limit positions to rounding: beside an irregular point after 64 halvings, by when
 //! less than 1e-9 of a cell is left. Derivatives within 2⁻²⁴ of one are those at that distance.
 
 use super::cage::Cage;

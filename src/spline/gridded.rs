@@ -118,7 +118,7 @@ impl Gridded {
         moved
     }
 
-    /// The control mesh, its points those of the quad mesh. Edges of cells along which the surface turns by more than [`SHARP`] for the most part, and by [`BLUNT`] all along, are creases.
+    /// The control mesh, its points those of the quad mesh. Edges of cells along which the surface turns by more than 40° for the most part, and by 20° all along, are creases.
     ///
     /// # Errors
     /// Cells that make no surface.

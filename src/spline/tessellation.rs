@@ -1,6 +1,6 @@
 //! The limit surface as triangles.
 //!
-//! *Enters:* a [`Limit`] surface and a number of parts along a side of a cell. *Leaves:* [`Triangles`]: points that cells share along their sides, and normals that they share but across creases.
+//! *Enters:* a [`Limit`] surface and a number of parts along a side of a cell. *Leaves:* a [`Tessellation`]: points that cells share along their sides, and normals that they share but across creases.
 
 use super::cage::{Cage, CellSide};
 use super::evaluator::CORNER;
