@@ -151,13 +151,6 @@ impl Evaluator {
         &self.points[first as usize..][..self.nodes[node as usize].points]
     }
 
-    /// Whether a cell is one bicubic piece.
-    pub fn is_regular(&self, cell: u32) -> bool {
-        self.nodes[self.cell[cell as usize].0 as usize]
-            .regular
-            .is_some()
-    }
-
     /// Weights of the point at a place of a cell, in the order of [`points`](Self::points).
     pub fn value(&self, cell: u32, place: [f64; 2]) -> Vec<f64> {
         let mut path = [(0u32, 0u8); MOST_DEPTH];
