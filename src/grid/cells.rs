@@ -14,7 +14,7 @@ use super::error::GridError;
 use super::map::{Corners, Freedom, GridMap, double_area};
 use super::quads::QuadMesh;
 use super::squares::Squares;
-use super::system::{self, Derivatives, System};
+use super::system::{Derivatives, Equations};
 use crate::geometry::ids::{FaceId, VertexId, VertexVec};
 use crate::geometry::mesh::{cross, dot, norm, sub};
 use rayon::prelude::*;
@@ -197,16 +197,12 @@ pub(super) fn unfold(
         return Ok(unfolded);
     }
     let seen_from = Corners::new(map);
-    let mut solver = system::solver(corners(&cells), mesh.points.len())?;
+    let mut equations = Equations::new(corners(&cells), &near)?;
     let mut before = energy(&cells, &spots, &|_| [0.0; 2]);
     for steps in 0..MOST_STEPS {
         let of_corner: Vec<_> = corners(&cells).map(|p| derivatives(&spots, p)).collect();
-        let is_free = spots.iter().zip(&near);
-        let is_free: Vec<[bool; 2]> = is_free
-            .map(|(spot, near)| spot.is_free.map(|free| free && *near))
-            .collect();
-        let system = System::new(corners(&cells).zip(&of_corner), &is_free);
-        let (mut step, _) = system.newton_step(&mut solver)?;
+        equations.sum(of_corner.iter(), |p| spots[p].is_free);
+        let (mut step, _) = equations.newton_step()?;
         for [x, y] in &mut step {
             let by = (REACH / x.hypot(*y)).min(1.0);
             (*x, *y) = (by * *x, by * *y);

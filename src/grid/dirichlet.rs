@@ -9,8 +9,8 @@
 use super::complex::turned;
 use super::density::Units;
 use super::error::GridError;
-use super::map::{Corners, GridMap, double_area, is_turned_over};
-use super::system::{self, Derivatives, System};
+use super::map::{Corners, Freedom, GridMap, double_area, is_turned_over};
+use super::system::{Derivatives, Equations};
 use crate::geometry::ids::FaceId;
 use rayon::prelude::*;
 
@@ -108,25 +108,30 @@ impl Rest {
     /// Gradient and positive semidefinite Hessian by the six coordinates of the corners.
     fn derivatives(&self, corners: [[f64; 2]; 3]) -> Derivatives {
         let j = self.jacobian(corners);
-        // J = U Σ Vᵀ with rotations U and V: singular values by half sums and differences.
+        // J = U Σ Vᵀ with rotations U and V by angles α and β: singular values and both α − β and α + β by half sums and differences.
         let (e, f) = (0.5 * (j[0][0] + j[1][1]), 0.5 * (j[0][0] - j[1][1]));
         let (g, h) = (0.5 * (j[1][0] + j[0][1]), 0.5 * (j[1][0] - j[0][1]));
-        let (q, r) = (e.hypot(h), f.hypot(g));
+        let (q, r) = ((e * e + h * h).sqrt(), (f * f + g * g).sqrt());
         let determinant = j[0][0] * j[1][1] - j[0][1] * j[1][0];
         let s1 = q + r;
         let s2 = determinant / s1;
-        let (sum, difference) = (h.atan2(e), g.atan2(f));
-        let (of_u, of_v) = (0.5 * (sum + difference), 0.5 * (difference - sum));
-        let (cu, su, cv, sv) = (of_u.cos(), of_u.sin(), of_v.cos(), of_v.sin());
-        let (u, v) = ([[cu, -su], [su, cu]], [[cv, -sv], [sv, cv]]);
-        // U M Vᵀ.
-        let rotated = |m: [[f64; 2]; 2]| -> [[f64; 2]; 2] {
-            let um: [[f64; 2]; 2] = std::array::from_fn(|i| {
-                std::array::from_fn(|k| u[i][0] * m[0][k] + u[i][1] * m[1][k])
-            });
-            std::array::from_fn(|i| {
-                std::array::from_fn(|k| um[i][0] * v[k][0] + um[i][1] * v[k][1])
-            })
+        let [c, s] = [e / q, h / q];
+        let [x, y] = match r > 0.0 {
+            true => [f / r, g / r],
+            false => [1.0, 0.0],
+        };
+        // U M Vᵀ for M = a 1 + b Z + c S + d X, where Z mirrors the second axis, S turns by a right angle and X swaps both axes: 1 and S are turned by α − β, Z and X by α + β.
+        let rotated = |[one, mirror, turn, swap]: [f64; 4]| -> [[f64; 2]; 2] {
+            [
+                [
+                    one * c - turn * s + mirror * x - swap * y,
+                    -one * s - turn * c + mirror * y + swap * x,
+                ],
+                [
+                    one * s + turn * c + mirror * y + swap * x,
+                    one * c - turn * s - mirror * x + swap * y,
+                ],
+            ]
         };
         // By coordinates of the corners: M : dJ with J = D B.
         let b = self.inverse;
@@ -137,19 +142,20 @@ impl Rest {
         };
         let slope = |s: f64| 2.0 * s - 2.0 / (s * s * s);
         let (p1, p2) = (slope(s1), slope(s2));
-        let gradient = by_corners(rotated([[p1, 0.0], [0.0, p2]])).map(|x| self.area * x);
+        let gradient = by_corners(rotated([0.5 * (p1 + p2), 0.5 * (p1 - p2), 0.0, 0.0]))
+            .map(|x| self.area * x);
         let cubes = (s1 * s2).powi(3);
         let half = 0.5f64.sqrt();
         let modes = [
-            (2.0 + 6.0 / s1.powi(4), [[1.0, 0.0], [0.0, 0.0]]),
-            (2.0 + 6.0 / s2.powi(4), [[0.0, 0.0], [0.0, 1.0]]),
+            (2.0 + 6.0 / s1.powi(4), [0.5, 0.5, 0.0, 0.0]),
+            (2.0 + 6.0 / s2.powi(4), [0.5, -0.5, 0.0, 0.0]),
             (
                 2.0 - 2.0 * (s1 * s1 - s1 * s2 + s2 * s2) / cubes,
-                [[0.0, -half], [half, 0.0]],
+                [0.0, 0.0, half, 0.0],
             ),
             (
                 2.0 + 2.0 * (s1 * s1 + s1 * s2 + s2 * s2) / cubes,
-                [[0.0, half], [half, 0.0]],
+                [0.0, 0.0, 0.0, half],
             ),
         ];
         let mut hessian = [[0.0; 6]; 6];
@@ -168,33 +174,69 @@ impl Rest {
     }
 }
 
-/// The state of the iteration.
-struct Problem<'a> {
-    map: &'a GridMap,
-    rest: Vec<Rest>,
+/// Faces of which a vertex may move: the energy of the others is what it is.
+struct Problem {
+    faces: Vec<(FaceId, Rest)>,
     corners: Corners,
+    /// Energy of the others, and the area of all.
+    others: f64,
+    total: f64,
 }
 
-impl Problem<'_> {
+impl Problem {
+    fn new(map: &GridMap, unit: &Units) -> Self {
+        let c = &map.sheet.fine.connectivity;
+        let (mut faces, mut others, mut total) = (Vec::new(), 0.0, 0.0);
+        for f in c.faces() {
+            let rest = rest(map, unit, f);
+            total += rest.area;
+            match c
+                .face_vertices(f)
+                .iter()
+                .all(|&v| map.freedom[v] == Freedom::Fixed)
+            {
+                true => others += rest.energy(map.corners(f)),
+                false => faces.push((f, rest)),
+            }
+        }
+        Self {
+            faces,
+            corners: Corners::new(map),
+            others,
+            total,
+        }
+    }
+
     /// Infinite where a face has no area.
     fn energy(&self, place: &[[f64; 2]]) -> f64 {
-        let of_face = self.rest.par_iter().enumerate().with_min_len(PIECE);
+        let of_face = self.faces.par_iter().with_min_len(PIECE);
         let energies: Vec<f64> = of_face
-            .map(|(f, rest)| rest.energy(self.corners.corners(FaceId::new(f), place)))
+            .map(|(f, rest)| rest.energy(self.corners.corners(*f, place)))
             .collect();
-        energies.iter().sum()
+        self.others + energies.iter().sum::<f64>()
     }
 
     /// How far all vertices may go along `step` before a face has no area, at most 1 / [`BEFORE_FLAT`] steps.
     fn longest(&self, place: &[[f64; 2]], step: &[[f64; 2]]) -> f64 {
-        let of_face = (0..self.rest.len()).into_par_iter().with_min_len(PIECE);
-        let longest = of_face.map(|f| {
-            let f = FaceId::new(f);
+        let of_face = self.faces.par_iter().with_min_len(PIECE);
+        let longest = of_face.map(|&(f, _)| {
             let (vertices, turns) = (self.corners.vertices(f), self.corners.turns(f));
             let d = [0, 1, 2].map(|k| turned(step[vertices[k] as usize], turns[k]));
             first_root(self.corners.corners(f, place), d)
         });
         longest.reduce(|| f64::INFINITY, f64::min)
+    }
+
+    /// Derivatives of every face at given places.
+    fn derivatives(&self, place: &[[f64; 2]]) -> Vec<Derivatives> {
+        let of_face = self.faces.par_iter().with_min_len(PIECE);
+        of_face
+            .map(|(f, rest)| {
+                let (g, h) = rest.derivatives(self.corners.corners(*f, place));
+                // In the frame of each vertex: turned back.
+                turned_back(&g, &h, self.corners.turns(*f))
+            })
+            .collect()
     }
 }
 
@@ -233,11 +275,9 @@ pub(super) fn densities(map: &GridMap, unit: &Units) -> impl Iterator<Item = (Fa
 /// Moves vertices until the energy is least; see the module docs.
 pub(crate) fn relax(map: &mut GridMap, unit: &Units) -> Result<Relaxed, GridError> {
     let c = &map.sheet.fine.connectivity;
-    let rest: Vec<Rest> = c.faces().map(|f| rest(map, unit, f)).collect();
-    let total: f64 = rest.iter().map(|r| r.area).sum();
     let mut place: Vec<[f64; 2]> = c.vertices().map(|v| map.place(v)).collect();
-    let corners = Corners::new(map);
-    let problem = Problem { map, rest, corners };
+    let problem = Problem::new(map, unit);
+    let total = problem.total;
     let first = problem.energy(&place);
     if !first.is_finite() {
         let flat = |f: &FaceId| problem.corners.corners(*f, &place);
@@ -246,10 +286,17 @@ pub(crate) fn relax(map: &mut GridMap, unit: &Units) -> Result<Relaxed, GridErro
         let count = over.len();
         return Err(GridError::TurnedOver { count, face });
     }
-    let mut solver = system::solver(problem.vertices(), place.len())?;
+    let triples = problem
+        .faces
+        .iter()
+        .map(|(f, _)| problem.corners.vertices(*f));
+    let is_free: Vec<[bool; 2]> = map.freedom.iter().map(|f| f.axes()).collect();
+    let may_move: Vec<bool> = is_free.iter().map(|axes| *axes != [false; 2]).collect();
+    let mut equations = Equations::new(triples, &may_move)?;
     let (mut energy, mut steps) = (first, 0);
     while steps < MOST_STEPS {
-        let (step, slope) = problem.system(&place).newton_step(&mut solver)?;
+        equations.sum(problem.derivatives(&place).iter(), |v| is_free[v]);
+        let (step, slope) = equations.newton_step()?;
         let mut length = (BEFORE_FLAT * problem.longest(&place, &step)).min(1.0);
         let mut found = None;
         for _ in 0..MOST_HALVINGS {
@@ -274,34 +321,11 @@ pub(crate) fn relax(map: &mut GridMap, unit: &Units) -> Result<Relaxed, GridErro
             break;
         }
     }
-    let corners = problem.corners;
-    corners.put(map, &place);
+    problem.corners.put(map, &place);
     Ok(Relaxed {
         steps,
         energy: [first / total, energy / total],
     })
-}
-
-impl Problem<'_> {
-    /// Vertices of every face.
-    fn vertices(&self) -> impl Iterator<Item = [u32; 3]> {
-        (0..self.rest.len()).map(|f| self.corners.vertices(FaceId::new(f)))
-    }
-
-    /// Derivatives at given places.
-    fn system(&self, place: &[[f64; 2]]) -> System {
-        let of_face = self.rest.par_iter().enumerate().with_min_len(PIECE);
-        let faces: Vec<_> = of_face
-            .map(|(f, rest)| {
-                let f = FaceId::new(f);
-                let (g, h) = rest.derivatives(self.corners.corners(f, place));
-                // In the frame of each vertex: turned back.
-                turned_back(&g, &h, self.corners.turns(f))
-            })
-            .collect();
-        let is_free: Vec<[bool; 2]> = self.map.freedom.iter().map(|f| f.axes()).collect();
-        System::new(self.vertices().zip(&faces), &is_free)
-    }
 }
 
 /// Gradient and Hessian by coordinates in frames that so many quarter turns take to the face's.

@@ -4,6 +4,7 @@
 //! numbers, so the result is the same everywhere.
 
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Squares of the raster along a side of the square, about, at most.
 const FINEST: usize = 512;
@@ -31,10 +32,17 @@ pub(super) struct Packed {
     pub side: usize,
 }
 
-/// An island on the raster: the columns of each of its rows, from the first to before the last.
+/// Rows of an island that are alike, from the first to before the last, and their columns, from the first to before the last.
+struct Band {
+    rows: [usize; 2],
+    runs: Vec<[usize; 2]>,
+}
+
+/// An island on the raster.
 struct Mask {
     size: [usize; 2],
-    runs: Vec<Vec<[usize; 2]>>,
+    /// From the one with the longest run on: what it does not fit need not be asked of others.
+    bands: Vec<Band>,
 }
 
 impl Mask {
@@ -62,7 +70,8 @@ impl Mask {
                 is_set[row * size[0] + left..row * size[0] + right].fill(true);
             }
         }
-        let runs = is_set.chunks(size[0]).map(|row| {
+        let mut bands: Vec<Band> = Vec::new();
+        for (r, row) in is_set.chunks(size[0]).enumerate() {
             let mut runs = Vec::new();
             let mut x = 0;
             while x < row.len() {
@@ -75,12 +84,26 @@ impl Mask {
                 }
                 x += 1;
             }
-            runs
-        });
-        Self {
-            size,
-            runs: runs.collect(),
+            match bands.last_mut() {
+                Some(band) if band.runs == runs => band.rows[1] = r + 1,
+                _ => bands.push(Band {
+                    rows: [r, r + 1],
+                    runs,
+                }),
+            }
         }
+        let longest = |band: &Band| band.runs.iter().map(|[from, to]| to - from).max();
+        bands.sort_by_key(|band| std::cmp::Reverse(longest(band)));
+        Self { size, bands }
+    }
+
+    /// Squares of the raster.
+    fn area(&self) -> usize {
+        let of_band = |band: &Band| {
+            let row: usize = band.runs.iter().map(|[from, to]| to - from).sum();
+            row * (band.rows[1] - band.rows[0])
+        };
+        self.bands.iter().map(of_band).sum()
     }
 }
 
@@ -109,52 +132,69 @@ impl Rows {
     }
 }
 
-/// Ors a row, moved to lower places by `by`, into another one.
-fn or_moved(into: &mut [u64], row: &[u64], by: usize) {
+/// What a row, moved to lower places by `by`, has in word `i`.
+fn moved(row: &[u64], by: usize, i: usize) -> u64 {
     let (words, bits) = (by / 64, by % 64);
-    for i in 0..into.len().saturating_sub(words) {
-        let low = row[i + words] >> bits;
-        let high = match (bits, row.get(i + words + 1)) {
-            (0, _) | (_, None) => 0,
-            (_, Some(next)) => next << (64 - bits),
-        };
-        into[i] |= low | high;
+    let word = |i: usize| row.get(i + words).copied().unwrap_or(0);
+    match bits {
+        0 => word(i),
+        _ => word(i) >> bits | word(i + 1) << (64 - bits),
     }
 }
 
 /// The lowest, then leftmost place of a mask in a square of this width, where nothing is higher than what is taken.
 fn place(taken: &Rows, mask: &Mask, width: usize, below: usize) -> Option<[usize; 2]> {
     let last = width.checked_sub(mask.size[0])?;
-    let mut blocked = vec![0u64; taken.words];
-    let (mut spread, mut next) = (blocked.clone(), blocked.clone());
+    // Bits beyond the last place count as taken.
+    let beyond = |i: usize| match (last + 1).saturating_sub(64 * i) {
+        0 => u64::MAX,
+        n if n >= 64 => 0,
+        n => u64::MAX << n,
+    };
+    let none: Vec<u64> = (0..=last / 64).map(beyond).collect();
+    let mut blocked = none.clone();
+    let (mut joined, mut spread) = (vec![0u64; taken.words], vec![0u64; taken.words]);
     for y in 0..=below {
-        blocked.fill(0);
-        for (r, runs) in mask.runs.iter().enumerate() {
-            let Some(row) = taken.row(y + r) else { break };
-            for &[from, to] in runs {
+        blocked.copy_from_slice(&none);
+        for band in &mask.bands {
+            joined.fill(0);
+            for row in (y + band.rows[0]..y + band.rows[1]).map_while(|r| taken.row(r)) {
+                joined.iter_mut().zip(row).for_each(|(j, r)| *j |= r);
+            }
+            for &[from, to] in &band.runs {
                 // Where any of the places from … to − 1 on is taken.
                 let mut reach = 1;
-                spread.copy_from_slice(row);
+                spread.copy_from_slice(&joined);
                 while reach < to - from {
                     let by = reach.min(to - from - reach);
-                    next.copy_from_slice(&spread);
-                    or_moved(&mut next, &spread, by);
-                    std::mem::swap(&mut spread, &mut next);
+                    // Words are read before they are written, higher ones too.
+                    for i in 0..spread.len() {
+                        spread[i] |= moved(&spread, by, i);
+                    }
                     reach += by;
                 }
-                or_moved(&mut blocked, &spread, from);
+                for (i, b) in blocked.iter_mut().enumerate() {
+                    *b |= moved(&spread, from, i);
+                }
+            }
+            if blocked.iter().all(|b| *b == u64::MAX) {
+                break;
             }
         }
-        let free = |x: &usize| blocked[x / 64] >> (x % 64) & 1 == 0;
-        if let Some(x) = (0..=last).find(free) {
-            return Some([x, y]);
+        if let Some(i) = blocked.iter().position(|b| *b != u64::MAX) {
+            return Some([64 * i + blocked[i].trailing_ones() as usize, y]);
         }
     }
     None
 }
 
-/// Packs into a strip of the given width; the height comes last.
-fn strip(masks: &[[Mask; 2]], order: &[usize], width: usize) -> (Vec<Placed>, usize) {
+/// Packs into a strip of the given width; the height comes last. `None` where that gets higher than `most`.
+fn strip(
+    masks: &[[Mask; 2]],
+    order: &[usize],
+    width: usize,
+    most: &AtomicUsize,
+) -> Option<(Vec<Placed>, usize)> {
     let mut places = vec![([0; 2], false); masks.len()];
     let mut taken = Rows {
         words: width.div_ceil(64) + 1,
@@ -171,14 +211,19 @@ fn strip(masks: &[[Mask; 2]], order: &[usize], width: usize) -> (Vec<Placed>, us
         let Some(((top, y, x), is_turned)) = found.min() else {
             continue;
         };
-        for (r, runs) in masks[i][usize::from(is_turned)].runs.iter().enumerate() {
-            runs.iter()
-                .for_each(|&[from, to]| taken.set(y + r, [x + from, x + to]));
+        for band in &masks[i][usize::from(is_turned)].bands {
+            for r in band.rows[0]..band.rows[1] {
+                let runs = band.runs.iter();
+                runs.for_each(|&[from, to]| taken.set(y + r, [x + from, x + to]));
+            }
         }
         places[i] = ([x, y], is_turned);
         height = height.max(top);
+        if height > most.load(Ordering::Relaxed) {
+            return None;
+        }
     }
-    (places, height)
+    Some((places, height))
 }
 
 /// Packs islands whose cells are `samples` texels wide, with so many texels between them.
@@ -194,10 +239,7 @@ pub(super) fn pack(outlines: &[Outline], samples: usize, gutter: usize) -> Packe
     let mask =
         |o: &Outline| [false, true].map(|is_turned| Mask::new(o, is_turned, samples, gutter, unit));
     let masks: Vec<[Mask; 2]> = outlines.par_iter().map(mask).collect();
-    let area = |i: usize| -> usize {
-        let runs = masks[i][0].runs.iter().flatten();
-        runs.map(|[from, to]| to - from).sum()
-    };
+    let area = |i: usize| masks[i][0].area();
     let total: usize = (0..masks.len()).map(area).sum();
     let root = (total as f64).sqrt();
     // The shorter side of the widest, so that all fit, turned or not.
@@ -219,18 +261,22 @@ pub(super) fn pack(outlines: &[Outline], samples: usize, gutter: usize) -> Packe
     let jobs: Vec<(usize, usize)> = (0..orders.len())
         .flat_map(|o| (0..tries).map(move |w| (o, w)))
         .collect();
+    // The least side so far: a strip that gets higher is given up, whichever was first.
+    let least = AtomicUsize::new(usize::MAX);
     let of = |&(o, w): &(usize, usize)| {
         let width = (root * (1.0 + 0.04 * w as f64)).ceil() as usize;
         let width = width.max(widest);
-        let (places, height) = strip(&masks, &orders[o], width);
+        let (places, height) = strip(&masks, &orders[o], width, &least)?;
         let reach = places.iter().zip(&masks);
         let reach = reach
             .map(|(([x, _], t), m)| x + m[usize::from(*t)].size[0])
             .max();
-        (reach.unwrap_or(1).max(height), places)
+        let side = reach.unwrap_or(1).max(height);
+        least.fetch_min(side, Ordering::Relaxed);
+        Some((side, places))
     };
-    let tried: Vec<(usize, Vec<Placed>)> = jobs.par_iter().map(of).collect();
-    let best = tried.into_iter().min_by_key(|(side, _)| *side);
+    let tried: Vec<Option<(usize, Vec<Placed>)>> = jobs.par_iter().map(of).collect();
+    let best = tried.into_iter().flatten().min_by_key(|(side, _)| *side);
     let (side, places) = best.unwrap_or_default();
     Packed {
         corner: places
