@@ -58,13 +58,14 @@ struct Spot {
     thickness: f64,
 }
 
-/// Corners of cells: the point there, the next and the previous.
+/// A corner of a cell: the point there, the next and the previous.
+fn corner(q: &[u32; 4], k: usize) -> [u32; 3] {
+    [q[k], q[(k + 1) % 4], q[(k + 3) % 4]]
+}
+
+/// All corners of cells.
 fn corners(quads: &[[u32; 4]]) -> impl Iterator<Item = [u32; 3]> {
-    let of_quad = |q: &[u32; 4]| {
-        let q = *q;
-        (0..4).map(move |k| [q[k], q[(k + 1) % 4], q[(k + 3) % 4]])
-    };
-    quads.iter().flat_map(of_quad)
+    quads.iter().flat_map(|q| (0..4).map(|k| corner(q, k)))
 }
 
 /// Points near corners of cells that are turned over or nearly.
@@ -187,7 +188,8 @@ pub(super) fn unfold(
     unit: &Units,
 ) -> Result<BTreeSet<VertexId>, GridError> {
     let mut unfolded = BTreeSet::new();
-    let Some((mut squares, mut spots)) = locate(map, mesh, unit) else {
+    let normals = normals(map);
+    let Some((mut squares, mut spots)) = locate(map, mesh, &normals, unit) else {
         return Ok(unfolded);
     };
     let near = near_bad_corners(mesh, &spots);
@@ -200,8 +202,8 @@ pub(super) fn unfold(
     let mut equations = Equations::new(corners(&cells), &near)?;
     let mut before = energy(&cells, &spots, &|_| [0.0; 2]);
     for steps in 0..MOST_STEPS {
-        let of_corner: Vec<_> = corners(&cells).map(|p| derivatives(&spots, p)).collect();
-        equations.sum(of_corner.iter(), |p| spots[p].is_free);
+        let of_corner = |i: usize| derivatives(&spots, corner(&cells[i / 4], i % 4));
+        equations.sum(of_corner, |p| spots[p].is_free);
         let (mut step, _) = equations.newton_step()?;
         for [x, y] in &mut step {
             let by = (REACH / x.hypot(*y)).min(1.0);
@@ -220,7 +222,7 @@ pub(super) fn unfold(
         let step = follow(map, mesh, &squares, &spots, &step);
         let moved = without_harm(map, &seen_from, &places, &step, length);
         seen_from.put(map, &moved);
-        let found = locate(map, mesh, unit);
+        let found = locate(map, mesh, &normals, unit);
         let there = found.as_ref().map_or(f64::INFINITY, |(_, spots)| {
             energy(&cells, spots, &|_| [0.0; 2])
         });
@@ -328,10 +330,14 @@ fn follow(
 }
 
 /// Where points lie; `None` where one is not found.
-fn locate<'a>(map: &GridMap, mesh: &'a QuadMesh, unit: &Units) -> Option<(Squares<'a>, Vec<Spot>)> {
+fn locate<'a>(
+    map: &GridMap,
+    mesh: &'a QuadMesh,
+    normals: &VertexVec<[f64; 3]>,
+    unit: &Units,
+) -> Option<(Squares<'a>, Vec<Spot>)> {
     let (sheet, c) = (&map.sheet, &map.sheet.fine.connectivity);
     let squares = Squares::new(map, mesh)?;
-    let normals = normals(map);
     let mut spots: Vec<Option<Spot>> = vec![None; mesh.points.len()];
     for f in c.faces() {
         let p = map.corners(f);

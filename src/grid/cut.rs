@@ -8,7 +8,7 @@ use super::cells::unfold;
 use super::density::Units;
 use super::dirichlet;
 use super::error::GridError;
-use super::map::{Anchor, Freedom, GridMap, is_turned_over};
+use super::map::{Anchor, Corners, Freedom, GridMap, is_turned_over};
 use super::quads::QuadMesh;
 use super::sheet::Aim;
 use super::slivers::thicken;
@@ -283,8 +283,9 @@ fn settle(
     let most = most.fold(1.0, |m: f64, x| m.max(x.abs()));
     let digits = (DIGITS - most.log2().ceil() as i32).min(MOST_DIGITS);
     let least = 0.5f64.powi(digits);
+    let corners = Corners::new(map);
     let round = |map: &mut GridMap| {
-        for v in c.vertices() {
+        let rounded = |v: VertexId| {
             let mut place = map.place(v).map(|x| (x / least).round() * least);
             match map.freedom[v] {
                 Freedom::Fixed => place = place.map(f64::round),
@@ -294,8 +295,10 @@ fn settle(
                 }
                 Freedom::Free => {}
             }
-            map.put(v, place);
-        }
+            place
+        };
+        let places: Vec<[f64; 2]> = c.vertices().map(rounded).collect();
+        corners.put(map, &places);
     };
     round(map);
     thicken(map);

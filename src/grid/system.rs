@@ -5,9 +5,14 @@
 use super::error::GridError;
 use crate::flow::solve::SymmetricSolver;
 use crate::geometry::ids::NONE;
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// What is added to the diagonal, part of it, where rounding keeps the factor from being positive.
 const DAMPINGS: [f64; 4] = [0.0, 1e-12, 1e-9, 1e-6];
+
+/// Triples whose derivatives are worked out before they are added.
+const PIECE: usize = 1 << 14;
 
 /// Gradient and Hessian of one triple.
 pub(super) type Derivatives = ([f64; 6], [[f64; 6]; 6]);
@@ -66,19 +71,43 @@ impl Equations {
         })
     }
 
-    /// Sums derivatives of triples. `is_free`: of every point, whether it may move along each axis.
-    pub(super) fn sum<'a>(
+    /// Sums derivatives of triples, each asked for by its number. `is_free`: of every point, whether it may move along each axis.
+    pub(super) fn sum(
         &mut self,
-        derivatives: impl Iterator<Item = &'a Derivatives>,
+        derivatives: impl Fn(usize) -> Derivatives + Sync,
         is_free: impl Fn(usize) -> [bool; 2],
     ) {
         let n = self.point.len();
         self.gradient.fill(0.0);
         self.diagonal.fill(0.0);
         self.off_diagonal[..n].fill(0.0);
-        let mut at = n;
         let is_free: Vec<[bool; 2]> = self.point.iter().map(|&p| is_free(p as usize)).collect();
-        for (t, (g, h)) in self.triples.iter().zip(derivatives) {
+        let mut at = n;
+        let mut of_triples = Vec::with_capacity(PIECE);
+        for begin in (0..self.triples.len()).step_by(PIECE) {
+            let piece = begin..self.triples.len().min(begin + PIECE);
+            let of_triple = piece.clone().into_par_iter().with_min_len(PIECE / 16);
+            of_triple
+                .map(&derivatives)
+                .collect_into_vec(&mut of_triples);
+            at = self.add(piece, &of_triples, &is_free, at);
+        }
+        for (d, free) in self.diagonal.iter_mut().zip(is_free.as_flattened()) {
+            if !free {
+                *d = 1.0;
+            }
+        }
+    }
+
+    /// Adds derivatives of some triples, whose couplings begin at `at`. Where those of the next begin.
+    fn add(
+        &mut self,
+        triples: Range<usize>,
+        derivatives: &[Derivatives],
+        is_free: &[[bool; 2]],
+        mut at: usize,
+    ) -> usize {
+        for (t, (g, h)) in self.triples[triples].iter().zip(derivatives) {
             let free = t.map(|v| match v {
                 NONE => [false; 2],
                 v => is_free[v as usize],
@@ -104,11 +133,7 @@ impl Equations {
                 at += 4;
             }
         }
-        for (d, free) in self.diagonal.iter_mut().zip(is_free.as_flattened()) {
-            if !free {
-                *d = 1.0;
-            }
-        }
+        at
     }
 
     /// The step of every point, and the slope of the energy along it.
