@@ -1,18 +1,26 @@
 //! CPU seconds, share and peak memory of every stage of the job on the fixtures, or on the meshes named as arguments.
 //!
 //! `cargo bench --bench stages -- [--levels N] [--runs N] [MESH…]`: each mesh and its N midpoint subdivisions with flips, one
-//! thread; the fastest run (of three) is shown. After each mesh: a table of its levels and how the time grows between them.
+//! thread; the fastest run (of three) is shown, and in it the parts that stages tell of, each without those inside it. After each mesh: a table of its levels and how the time grows
+//! between them.
 
 mod common;
 
 use affine_atlas::config::Config;
 use affine_atlas::flow::ricci::Scheme;
-use affine_atlas::observe::Observer;
+use affine_atlas::observe::{Observer, PARTS};
 use affine_atlas::{job, outcome::AssetState};
 use common::{Arguments, Triangles, cpu_seconds, forget_peak, peak_mebibytes};
 use std::error::Error;
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
+use tracing::Subscriber;
+use tracing::level_filters::LevelFilter;
+use tracing::span::{Attributes, Id};
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::layer::{Context, Layer, SubscriberExt};
+use tracing_subscriber::registry::LookupSpan;
+use tracing_subscriber::util::SubscriberInitExt;
 
 /// What a stage took.
 #[derive(Clone, Copy)]
@@ -37,11 +45,46 @@ impl Observer for Stopwatch {
     }
 }
 
+/// Adds up the CPU seconds of parts of stages, in the thread of the job.
+#[derive(Clone, Default)]
+struct Parts(Arc<Mutex<PartsSoFar>>);
+
+#[derive(Default)]
+struct PartsSoFar {
+    /// Begun and not over: when, and how long those inside took.
+    open: Vec<(f64, f64)>,
+    seconds: Vec<(&'static str, f64)>,
+}
+
+impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for Parts {
+    fn on_new_span(&self, _: &Attributes<'_>, _: &Id, _: Context<'_, S>) {
+        let mut parts = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        parts.open.push((cpu_seconds(), 0.0));
+    }
+
+    fn on_close(&self, id: Id, context: Context<'_, S>) {
+        let mut parts = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let (Some((begin, inside)), Some(span)) = (parts.open.pop(), context.span(&id)) else {
+            return;
+        };
+        let whole = cpu_seconds() - begin;
+        if let Some((_, around)) = parts.open.last_mut() {
+            *around += whole;
+        }
+        let (name, own) = (span.name(), whole - inside);
+        match parts.seconds.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, sum)) => *sum += own,
+            None => parts.seconds.push((name, own)),
+        }
+    }
+}
+
 /// One mesh of a table.
 struct Level {
     vertices: usize,
     faces: usize,
     stages: Vec<Stage>,
+    parts: Vec<(&'static str, f64)>,
 }
 
 impl Level {
@@ -66,6 +109,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build_global()?;
+    let parts = Parts::default();
+    let own = Targets::new().with_target(PARTS, LevelFilter::TRACE);
+    tracing_subscriber::registry()
+        .with(parts.clone().with_filter(own))
+        .try_init()?;
     let mut arguments = Arguments::parse()?;
     if arguments.meshes.is_empty() {
         let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/good");
@@ -88,10 +136,14 @@ fn main() -> Result<(), Box<dyn Error>> {
             };
             let mut best: Option<Level> = None;
             for _ in 0..arguments.runs {
+                *parts.0.lock().unwrap_or_else(PoisonError::into_inner) = PartsSoFar::default();
+                let stages = measure(path)?;
+                let of_run = parts.0.lock().unwrap_or_else(PoisonError::into_inner);
                 let level = Level {
                     vertices: triangles.positions.len(),
                     faces: triangles.faces.len(),
-                    stages: measure(path)?,
+                    stages,
+                    parts: of_run.seconds.clone(),
                 };
                 if best
                     .as_ref()
@@ -128,6 +180,9 @@ fn print_stages(name: &str, level: &Level) {
             stage.peak
         );
     }
+    let parts = level.parts.iter();
+    let parts = parts.map(|(name, seconds)| format!("{name} {seconds:.3} s"));
+    println!("  parts: {}", parts.collect::<Vec<_>>().join(", "));
     println!(
         "  verification: {:.2} microseconds a face",
         1e6 * level.seconds(&["verify"]) / level.faces as f64
@@ -166,9 +221,10 @@ fn print_table(name: &str, levels: &[Level]) {
         "(overlay + cut + charts) / flow",
         each(&|l| format!("{:.2}", ratio(l))),
     );
-    let growth: [(&str, &[&str]); 4] = [
+    let growth: [(&str, &[&str]); 5] = [
         ("whole job", &[]),
         ("flow", &["flow"]),
+        ("grid", &["grid"]),
         ("overlay + cut + charts", &AFTER_FLOW),
         (
             "patches to write",

@@ -15,3 +15,14 @@ pub trait Observer: Sync {
 }
 
 impl Observer for () {}
+
+/// The target of the spans that parts of stages are.
+pub const PARTS: &str = "affine_atlas::parts";
+
+/// Begins a part of a stage, which lasts as long as what this gives is kept: `let _part = part!("quantise");`.
+macro_rules! part {
+    ($name:literal) => {
+        tracing::trace_span!(target: $crate::observe::PARTS, $name).entered()
+    };
+}
+pub(crate) use part;

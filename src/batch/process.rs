@@ -193,7 +193,7 @@ impl Process {
     pub fn hear(&mut self, event: &Event) {
         match event {
             Event::Stage { name, .. } => self.stage.clone_from(name),
-            Event::Step(_) => {}
+            Event::Step(_) | Event::Part(_) => {}
             Event::Finished(outcome) => self.outcome = Some((**outcome).clone()),
         }
     }

@@ -17,7 +17,7 @@ use std::io::{self, BufRead, Read, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 /// What a worker is told, beside the paths of input and output, which are arguments because they need not be Unicode.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -55,6 +55,8 @@ pub struct Voice {
     pub colours: bool,
     /// Least time between two events of the flow, milliseconds; none: no such events.
     pub steps: Option<u64>,
+    /// Tells how long stages and their parts took.
+    pub parts: bool,
 }
 
 /// What a worker says.
@@ -72,8 +74,41 @@ pub enum Event {
     },
     /// The flow took a step.
     Step(FlowStep),
+    /// A stage, or a part of one, is over.
+    Part(Part),
     /// Nothing follows.
     Finished(Box<AssetOutcome>),
+}
+
+/// A stretch of work.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Part {
+    /// What was done.
+    pub name: String,
+    /// Component, from 0; of stages.
+    pub component: Option<usize>,
+    /// The thread: 0, or one of the pool, from 1.
+    pub thread: usize,
+    /// When it began, microseconds since 1970.
+    pub begin: u64,
+    /// How long it took, microseconds.
+    pub microseconds: u64,
+}
+
+impl Part {
+    /// From `begin` until now, in this thread.
+    #[must_use]
+    pub fn since(name: &str, component: Option<usize>, begin: SystemTime) -> Self {
+        // A clock that was set back in between says nothing.
+        let microseconds = |d: Result<Duration, _>| d.map_or(0, |d: Duration| d.as_micros() as u64);
+        Self {
+            name: name.to_owned(),
+            component,
+            thread: rayon::current_thread_index().map_or(0, |i| i + 1),
+            begin: microseconds(begin.duration_since(SystemTime::UNIX_EPOCH)),
+            microseconds: microseconds(begin.elapsed()),
+        }
+    }
 }
 
 /// Reads the job and holds this process to its limits. From here on it ends with whoever asked.
@@ -150,7 +185,7 @@ pub fn work(job: &Job, path: &Path, output: &Path) -> AssetOutcome {
 /// Passes on what the job tells, and logs how long each stage took.
 struct Told<'j> {
     job: &'j Job,
-    stage: Mutex<Option<(&'static str, usize, Instant)>>,
+    stage: Mutex<Option<(&'static str, usize, SystemTime, Instant)>>,
     step: Mutex<Option<Instant>>,
 }
 
@@ -166,7 +201,10 @@ impl<'j> Told<'j> {
     /// The stage that was under way is over.
     fn leave(&self) {
         let mut stage = self.stage.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((name, component, since)) = stage.take() {
+        if let Some((name, component, begin, since)) = stage.take() {
+            if self.job.voice.parts {
+                send(&Event::Part(Part::since(name, Some(component), begin)));
+            }
             tracing::info!(
                 target: "affine_atlas::stages",
                 asset = self.job.id,
@@ -183,7 +221,7 @@ impl Observer for Told<'_> {
     fn stage(&self, name: &'static str, component: usize, components: usize) {
         self.leave();
         *self.stage.lock().unwrap_or_else(PoisonError::into_inner) =
-            Some((name, component, Instant::now()));
+            Some((name, component, SystemTime::now(), Instant::now()));
         send(&Event::Stage {
             name: name.to_owned(),
             component,
@@ -270,6 +308,7 @@ mod tests {
                 components: 2,
             },
             Event::Step(FlowStep::default()),
+            Event::Part(Part::since("quantise", None, SystemTime::now())),
             Event::Finished(Box::new(outcome)),
             Event::Finished(Box::new(AssetOutcome::failed("a", failure, 1.0))),
         ] {

@@ -277,6 +277,9 @@ pub struct Build {
     /// Write for Make and Ninja which files OUT/manifest.jsonl was made from
     #[arg(long, value_name = "FILE")]
     pub depfile: Option<PathBuf>,
+    /// Write where the time goes, as a trace that Perfetto (ui.perfetto.dev) opens
+    #[arg(long, value_name = "FILE")]
+    pub profile: Option<PathBuf>,
     /// Meshes to build at the same time; 0 takes one for each core [default: run.jobs of the configuration]
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
     pub jobs: Option<u16>,

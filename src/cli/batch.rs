@@ -60,6 +60,7 @@ fn voice(global: &Global) -> Voice {
         json,
         colours: console::colors_enabled_stderr(),
         steps,
+        parts: false,
     }
 }
 

@@ -4,6 +4,7 @@ use super::arguments::{Build, Global, LogFormat};
 use super::batch::{batch, exit_code, show, write_records};
 use super::inputs::select;
 use super::problem::Problem;
+use super::profile::Profile;
 use super::progress::Progress;
 use super::work::Work;
 use super::{exit, interrupt, terminal};
@@ -17,13 +18,14 @@ pub fn run(build: &Build, global: &Global, work: &Work) -> Result<u8, Problem> {
     let tasks = selected.tasks();
     let run = &selected.config.run;
     let jobs = build.jobs.map_or(run.jobs, usize::from);
-    let batch = batch(
+    let mut batch = batch(
         &selected.output,
         build.force,
         jobs,
         run.total_memory,
         global,
     )?;
+    batch.voice.parts = build.profile.is_some();
     if build.dry_run {
         return Ok(show_decisions(
             &tasks,
@@ -34,8 +36,12 @@ pub fn run(build: &Build, global: &Global, work: &Work) -> Result<u8, Problem> {
     let announce = !global.quiet && global.log_format == LogFormat::Text;
     interrupt::install(work.remove_staging, announce);
     let progress = Progress::new(global, tasks.len());
-    let (outcomes, recorded) = (work.batch)(&batch, &tasks, &progress);
+    let profile = Profile::new(&progress);
+    let (outcomes, recorded) = (work.batch)(&batch, &tasks, &profile);
     progress.finish();
+    if let Some(path) = &build.profile {
+        profile.write(path, &tasks)?;
+    }
     let recorded = recorded.map_err(|failure| Problem::NotRecorded {
         path: selected.output.join("manifest.jsonl"),
         reason: failure.message,

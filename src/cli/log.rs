@@ -1,7 +1,9 @@
 //! Structured log lines: on standard error, and of each mesh in a file.
 
 use super::arguments::{Global, LogFormat};
+use super::profile::Tell;
 use affine_atlas::batch::worker::Voice;
+use affine_atlas::observe::PARTS;
 use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
@@ -32,16 +34,15 @@ pub fn start(global: &Global) {
     let level = level(global.quiet, global.verbose, json);
     // A second subscriber is refused; there is none in this program.
     let _ = tracing_subscriber::registry()
-        .with(on_standard_error(json).with_filter(level))
+        .with(on_standard_error(json).with_filter(lines(level)))
         .try_init();
 }
 
 /// The same for a worker, with everything from INFO on (`-v`: all there is) as JSON lines in a file of its own, which replaces that of
 /// an earlier run. Gives why there is no file.
 pub fn start_worker(voice: &Voice, path: &Path) -> Result<(), std::io::Error> {
-    let terminal = Targets::new()
-        .with_default(level(voice.quiet, voice.verbose, voice.json))
-        .with_target(STAGES, LevelFilter::OFF);
+    let level = level(voice.quiet, voice.verbose, voice.json);
+    let terminal = lines(level).with_target(STAGES, LevelFilter::OFF);
     let (file, trouble) = match File::create(path) {
         Ok(file) => (Some(Arc::new(file)), Ok(())),
         Err(error) => (None, Err(error)),
@@ -53,13 +54,25 @@ pub fn start_worker(voice: &Voice, path: &Path) -> Result<(), std::io::Error> {
     let own = file.map(|file| {
         let lines = tracing_subscriber::fmt::layer().json().flatten_event(true);
         let targets = Targets::new().with_target("affine_atlas", detail);
+        let targets = targets.with_target(PARTS, LevelFilter::OFF);
         lines.with_writer(file).with_filter(targets)
+    });
+    let parts = voice.parts.then(|| {
+        let targets = Targets::new().with_target(PARTS, LevelFilter::TRACE);
+        Tell.with_filter(targets)
     });
     let _ = tracing_subscriber::registry()
         .with(on_standard_error(voice.json).with_filter(terminal))
         .with(own)
+        .with(parts)
         .try_init();
     trouble
+}
+
+/// What is said in lines: parts are not.
+fn lines(level: LevelFilter) -> Targets {
+    let all = Targets::new().with_default(level);
+    all.with_target(PARTS, LevelFilter::OFF)
 }
 
 fn on_standard_error<S>(json: bool) -> Box<dyn Layer<S> + Send + Sync>

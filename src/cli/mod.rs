@@ -16,6 +16,7 @@ mod panics;
 mod plan;
 
 mod problem;
+mod profile;
 mod progress;
 mod rebuild;
 mod run;

@@ -6,7 +6,7 @@ use affine_atlas::batch::worker::Event;
 use affine_atlas::batch::{Task, Watcher};
 use affine_atlas::flow::ricci::FlowStep;
 use affine_atlas::observe::Observer;
-use affine_atlas::outcome::AssetOutcome;
+use affine_atlas::outcome::{AssetOutcome, AssetState};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
@@ -160,6 +160,8 @@ fn bars(assets: usize) -> Style {
         ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
     };
     all.set_style(style("{bar:30} {pos}/{len} meshes  {elapsed}  {msg}"));
+    // The clock runs while the first mesh is under way.
+    all.enable_steady_tick(Duration::from_secs(1));
     let one = group.add(ProgressBar::new_spinner());
     one.set_style(style("{spinner} {prefix}  {wide_msg}"));
     one.enable_steady_tick(Duration::from_millis(120));
@@ -337,7 +339,7 @@ impl Watcher for Progress {
                 let stage = running.stages.get(&task).cloned().unwrap_or_default();
                 self.show_step(index, &running.ids[task], &stage, step);
             }
-            Event::Finished(_) => {}
+            Event::Part(_) | Event::Finished(_) => {}
         }
     }
 
@@ -359,8 +361,10 @@ impl Watcher for Progress {
             return;
         };
         running.stages.remove(&task);
-        running.done += 1;
-        running.cost_done += running.costs[task] as f64;
+        if outcome.state != AssetState::Cancelled {
+            running.done += 1;
+            running.cost_done += running.costs[task] as f64;
+        }
         let left = match running.done < self.assets {
             true => running.left().map(in_words),
             false => None,

@@ -38,6 +38,7 @@ pub use provenance::Provenance;
 pub use shapes::check_shapes;
 
 use crate::atlas::geometry_image::pack_images;
+use crate::observe::part;
 use crate::product::AffineAtlas;
 use folder::Staging;
 use rayon::prelude::*;
@@ -63,6 +64,7 @@ pub fn write_component(
     staging.write(&name, document.to_text().as_bytes())?;
     files.push(name);
 
+    let part = part!("npz");
     // Through memory: a zip writer that meets a full disk complains on the terminal when dropped.
     let name = inside("atlas.npz");
     let mut archive = io::Cursor::new(Vec::new());
@@ -70,6 +72,8 @@ pub fn write_component(
     staging.write(&name, archive.get_ref())?;
     files.push(name);
 
+    drop(part);
+    let part = part!("images");
     // Compression takes most of the time, and images do not depend on each other.
     let images: Vec<_> = (atlas.images.par_iter().enumerate())
         .map(|(id, image)| {
@@ -85,6 +89,7 @@ pub fn write_component(
     for name in images {
         files.push(name?);
     }
+    drop(part);
 
     if let (Some(places), Some(label)) = (
         &atlas.patches.packed,
@@ -108,6 +113,7 @@ pub fn write_component(
         files.push(name);
     }
 
+    let _part = part!("glb");
     let name = inside("surface.glb");
     let bytes = glb::encode(atlas, &document, provenance)?;
     staging.write(&name, &bytes)?;

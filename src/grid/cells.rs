@@ -17,6 +17,7 @@ use super::squares::Squares;
 use super::system::{Derivatives, Equations};
 use crate::geometry::ids::{FaceId, VertexId, VertexVec};
 use crate::geometry::mesh::{cross, dot, norm, sub};
+use crate::observe::part;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
@@ -187,6 +188,7 @@ pub(super) fn unfold(
     mesh: &QuadMesh,
     unit: &Units,
 ) -> Result<BTreeSet<VertexId>, GridError> {
+    let _part = part!("unfold cells");
     let mut unfolded = BTreeSet::new();
     let normals = normals(map);
     let Some((mut squares, mut spots)) = locate(map, mesh, &normals, unit) else {

@@ -12,6 +12,7 @@ use super::error::GridError;
 use super::map::{Corners, Freedom, GridMap, double_area, is_turned_over};
 use super::system::{Derivatives, Equations};
 use crate::geometry::ids::FaceId;
+use crate::observe::part;
 use rayon::prelude::*;
 
 /// Most steps.
@@ -269,6 +270,7 @@ pub(super) fn densities(map: &GridMap, unit: &Units) -> impl Iterator<Item = (Fa
 
 /// Moves vertices until the energy is least; see the module docs.
 pub(crate) fn relax(map: &mut GridMap, unit: &Units) -> Result<Relaxed, GridError> {
+    let _part = part!("relax");
     let c = &map.sheet.fine.connectivity;
     let mut place: Vec<[f64; 2]> = c.vertices().map(|v| map.place(v)).collect();
     let problem = Problem::new(map, unit);

@@ -42,6 +42,7 @@ use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceVec, HalfedgeId, HalfedgeVec, VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, triangle_area};
 use crate::geometry::subdivision::Subdivision;
+use crate::observe::part;
 use blocks::Blocks;
 use density::Units;
 use islands::Islands;
@@ -150,6 +151,7 @@ pub fn grid(
     let lines = lines(&surface, params.cells);
     let uv = &surface.central.uv;
     let (map, grid, located) = made(&surface.mesh, uv, &lines, params, gutter)?;
+    let _part = part!("lift");
     let surface = charted::lift(surface, &map.sheet.fine);
     let layout = patches::layout(&surface, &grid, located);
     Ok((surface, layout, grid))
@@ -164,9 +166,12 @@ fn made(
     gutter: usize,
 ) -> Result<(GridMap, Grid, layout::Located), GridError> {
     let c = &mesh.connectivity;
+    let part = part!("cone triangulation");
     let flat = cone_triangulation::complex(c, central, lines)?;
     let turns: HalfedgeVec<u8> = c.halfedges().map(|h| flat.side(h).turns).collect();
     let cones = cone_triangulation::reduce(flat, c.vertex_count())?;
+    drop(part);
+    let part = part!("quantise");
     let wanted = params.cells as f64;
     let mut lattice = quantise::quantise(&cones.complex, cones.vertex.len(), wanted)?;
     let mut quads = lattice.quads()?;
@@ -185,8 +190,12 @@ fn made(
     if !quads.is_simple() {
         return Err(GridError::NoCells);
     }
+    drop(part);
+    let part = part!("blocks and islands");
     let mut blocks = quads.blocks()?;
     let islands = islands::arrange(&quads, &mut blocks, params.samples_per_cell, gutter)?;
+    drop(part);
+    let part = part!("affine map");
     let mut fine = Subdivision::identity(mesh);
     for h in c.halfedges() {
         fine.corner[h].uv = central[c.face(h)][c.corner(h)];
@@ -203,6 +212,7 @@ fn made(
     let areas = c.faces().map(|f| triangle_area(mesh.face_positions(f)));
     let cell_size = (areas.sum::<f64>() / quads.quads.len() as f64).sqrt();
     let unit = Units::new(mesh, cell_size, params.density)?;
+    drop(part);
     let relaxed = dirichlet::relax(&mut map, &unit)?;
     let unfolded = cells::unfold(&mut map, &quads, &unit)?;
     tracing::debug!(
@@ -214,8 +224,10 @@ fn made(
         unfolded = unfolded.len(),
         "grid"
     );
+    let part = part!("borders of blocks");
     let placed = cut::cut(&mut map, &quads, &blocks, &unit, &unfolded)?;
     let located = layout::locate(&map, &quads, &blocks, &placed)?;
+    drop(part);
     let k = &map.sheet.fine.connectivity;
     let of_edges = |f, of: &dyn Fn(HalfedgeId) -> [i64; 2]| {
         let h = k.face_halfedges(f);

@@ -9,7 +9,7 @@ use crate::config::Config;
 use crate::flow::cones::Requests;
 use crate::geometry::deviation::Triangles;
 use crate::grid;
-use crate::observe::Observer;
+use crate::observe::{Observer, part};
 use crate::product::AffineAtlas;
 use crate::rebuild::Images;
 use crate::repair::Component;
@@ -82,6 +82,7 @@ pub(super) fn pipeline(
         positions: given.as_slice(),
         faces: &given_faces,
     };
+    let _part = part!("image error");
     let readable = Images::new(&patches, &images, origin);
     let (quality, distances) = report::measure_images(
         quality,

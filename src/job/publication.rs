@@ -8,7 +8,7 @@ use super::precision::Precision;
 use crate::config::Config;
 use crate::export::folder::{Staging, component_name};
 use crate::export::{self, ExportError, Provenance, pictures, report as report_page};
-use crate::observe::Observer;
+use crate::observe::{Observer, part};
 use crate::product::AffineAtlas;
 use crate::read::SourceAsset;
 use crate::verify::{VerifyOptions, verify_atlas};
@@ -121,10 +121,12 @@ impl<'a> Publication<'a> {
         go_on()?;
         observer.stage("pages", component, components);
         if config.pictures.enabled {
+            let _part = part!("pictures");
             pictures::write(staging, &subfolder, atlas, config.pictures.size)?;
         }
         go_on()?;
         if config.report.enabled {
+            let _part = part!("page");
             report_page::write(staging, &subfolder, atlas, &provenance, &config.report)?;
         }
         go_on()?;

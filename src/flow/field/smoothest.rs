@@ -16,6 +16,7 @@ use super::{CrossField, FieldError};
 use crate::flow::solve::SymmetricSolver;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{FaceId, FaceVec, HalfedgeVec};
+use crate::observe::part;
 use std::f64::consts::FRAC_PI_2;
 
 /// Added to the diagonal, where every face has 3: a parallel field, on a flat torus, has energy 0, and the matrix would be singular.
@@ -36,6 +37,7 @@ pub fn cross_field(
     area: &FaceVec<f64>,
     pull: &FaceVec<[f64; 2]>,
 ) -> Result<CrossField, FieldError> {
+    let _part = part!("cross field");
     let c = connectivity;
     let rho = transport(c, angle);
     let energy = Energy::new(c, &rho, area, pull);

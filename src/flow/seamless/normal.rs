@@ -9,6 +9,7 @@ use super::norm::Norm;
 use super::state::{Problem, State};
 use crate::flow::solve::SymmetricSolver;
 use crate::geometry::ids::{EdgeId, EdgeVec, NONE, VertexId};
+use crate::observe::part;
 
 /// Shifts of the diagonal, relative to its mean, tried in turn until the matrix is positive definite.
 const SHIFTS: [f64; 4] = [1e-14, 1e-12, 1e-10, 1e-8];
@@ -37,6 +38,7 @@ impl Normal {
         norm: &Norm,
         last: Option<Self>,
     ) -> Result<Self, SeamlessError> {
+        let _part = part!("Jacobian and factor");
         let equations = problem.equations();
         let by_edges = state.by_edges(problem)?;
         let by_scales = norm.vertex.as_ref();

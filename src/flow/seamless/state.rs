@@ -14,6 +14,7 @@ use crate::flow::straighten::{EuclidFlip, StraightenError, Straightened, straigh
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::disjoint_sets::UnionFind;
 use crate::geometry::ids::{EdgeId, EdgeVec, FaceVec, VertexId, VertexVec};
+use crate::observe::part;
 use std::f64::consts::FRAC_PI_2;
 
 /// What is solved: angles are to reach those of a signature.
@@ -151,6 +152,7 @@ impl<'a> Problem<'a> {
 
     /// Flips to Delaunay and measures.
     pub(super) fn evaluate(&self, penner: &EdgeVec<f64>) -> State {
+        let _part = part!("flips and angles");
         let log_length = penner.iter().map(|l| 0.5 * l).collect();
         let correspondences = self.identity.iter().cloned().collect();
         let mut delaunay = Delaunay::from_logs(self.base.clone(), log_length, correspondences);
