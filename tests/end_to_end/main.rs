@@ -17,6 +17,7 @@ mod hard;
 mod interrupt;
 mod packed;
 mod prescriptions;
+mod profile;
 #[path = "../real_models/mod.rs"]
 mod real_models;
 mod rebuild;
