@@ -294,6 +294,7 @@ pub(crate) fn relax(map: &mut GridMap, unit: &Units) -> Result<Relaxed, GridErro
     while steps < MOST_STEPS {
         equations.sum(|i| problem.derivatives(i, &place), |v| is_free[v]);
         let (step, slope) = equations.newton_step()?;
+        let _part = part!("line search");
         let most = BEFORE_FLAT * problem.longest(&place, &step);
         let at = |length: f64| -> (Vec<[f64; 2]>, f64) {
             let by = |(p, s): (&[f64; 2], &[f64; 2])| [p[0] + length * s[0], p[1] + length * s[1]];

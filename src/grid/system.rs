@@ -5,6 +5,7 @@
 use super::error::GridError;
 use crate::flow::solve::SymmetricSolver;
 use crate::geometry::ids::NONE;
+use crate::observe::part;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -41,6 +42,7 @@ impl Equations {
         triples: impl Iterator<Item = [u32; 3]>,
         may_move: &[bool],
     ) -> Result<Self, GridError> {
+        let _part = part!("order of elimination");
         let mut unknown = vec![NONE; may_move.len()];
         let points = (0..may_move.len()).filter(|&p| may_move[p]);
         let point: Vec<u32> = points.map(|p| p as u32).collect();
@@ -77,6 +79,7 @@ impl Equations {
         derivatives: impl Fn(usize) -> Derivatives + Sync,
         is_free: impl Fn(usize) -> [bool; 2],
     ) {
+        let _part = part!("derivatives");
         let n = self.point.len();
         self.gradient.fill(0.0);
         self.diagonal.fill(0.0);
@@ -138,6 +141,7 @@ impl Equations {
 
     /// The step of every point, and the slope of the energy along it.
     pub(super) fn newton_step(&mut self) -> Result<(Vec<[f64; 2]>, f64), GridError> {
+        let _part = part!("factor and solve");
         let mut result = Ok(());
         for damping in DAMPINGS {
             let damped: Vec<f64> = self.diagonal.iter().map(|d| d * (1.0 + damping)).collect();
