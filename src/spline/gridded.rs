@@ -60,8 +60,9 @@ impl Sample {
 /// An edge of cells is a crease where sharp edges cover this part of it.
 const COVERED: f64 = 0.9;
 /// Angles of creases, radians: 40° for the most part, 20° all along.
-const SHARP: f64 = 40.0 * std::f64::consts::PI / 180.0;
-const BLUNT: f64 = SHARP / 2.0;
+pub const SHARP: f64 = 40.0 * std::f64::consts::PI / 180.0;
+/// See [`SHARP`].
+pub const BLUNT: f64 = SHARP / 2.0;
 /// Creases that hang together have as many edges of cells, at least.
 const SHORTEST_NET: usize = 8;
 /// Creases that end inside have as many edges of cells, at least.
@@ -123,80 +124,10 @@ impl Gridded {
     /// # Errors
     /// Cells that make no surface.
     pub fn cage(&self) -> Result<Cage, SplineError> {
-        let [blunt, sharp] = [BLUNT, SHARP].map(|angle| self.covered(angle));
-        let cage = |is_crease: &dyn Fn([u32; 2]) -> bool, is_corner: Vec<bool>| {
-            let at = |(c, k): CellSide| {
-                let corners = self.cells[c as usize];
-                is_crease(sorted([
-                    corners[usize::from(k)],
-                    corners[usize::from((k + 1) & 3)],
-                ]))
-            };
-            Cage::new(self.points.len(), self.cells.clone(), at, is_corner)
-        };
-        let none = || vec![false; self.points.len()];
-        let part = |covered: &FxHashMap<[u32; 2], f64>, ends: [u32; 2]| {
-            covered.get(&ends).copied().unwrap_or(0.0)
-        };
-        let all = cage(&|ends| part(&blunt, ends) >= COVERED, none())?;
-        // Chains that are sharp for the most part, and long enough not to be noise if they end inside.
-        let steps = |chain: &[u32]| -> Vec<[u32; 2]> {
-            chain.windows(2).map(|w| sorted([w[0], w[1]])).collect()
-        };
-        let mut kept: Vec<Vec<u32>> = all.chains();
-        kept.retain(|chain| {
-            let steps = steps(chain);
-            2.0 * steps.iter().map(|&s| part(&sharp, s)).sum::<f64>() >= steps.len() as f64
-        });
-        let mut edges: FxHashSet<[u32; 2]> = kept.iter().flat_map(|chain| steps(chain)).collect();
-        let chains = cage(&|ends| edges.contains(&ends), none())?;
-        kept = chains.chains();
-        kept.retain(|chain| {
-            let ends = [chain[0], chain[chain.len() - 1]];
-            let goes_on = ends.iter().all(|&v| chains.is_corner[v as usize]) || ends[0] == ends[1];
-            goes_on || chain.len() > SHORTEST_CREASE
-        });
-        // And what hangs together is longer than around two cells.
-        let mut sets = UnionFind::new(self.points.len());
-        kept.iter().for_each(|chain| {
-            chain.windows(2).for_each(|w| {
-                sets.join(w[0] as usize, w[1] as usize);
-            })
-        });
-        let mut length = vec![0; self.points.len()];
-        for chain in &kept {
-            length[sets.find(chain[0] as usize)] += chain.len() - 1;
-        }
-        let border = chains.leaving();
-        let is_on_border = |v: u32| {
-            border[v as usize].is_some_and(|side| chains.turn_back(chains.star(side)[0]).is_none())
-        };
-        let touches: FxHashSet<usize> = kept
-            .iter()
-            .flatten()
-            .filter(|&&v| is_on_border(v))
-            .map(|&v| sets.find(v as usize))
-            .collect();
-        kept.retain(|chain| {
-            let set = sets.find(chain[0] as usize);
-            length[set] >= SHORTEST_NET || touches.contains(&set)
-        });
-        edges = kept.iter().flat_map(|chain| steps(chain)).collect();
-        // Where the limit surface would have no tangent plane, creases end an edge before.
-        loop {
-            let found = cage(&|ends| edges.contains(&ends), none())?;
-            let untidy = found.untidy_creases();
-            if untidy.is_empty() {
-                let is_corner = found.turns_around_cells();
-                return cage(&|ends| edges.contains(&ends), is_corner);
-            }
-            for side in untidy {
-                edges.remove(&sorted([
-                    found.tail(side),
-                    found.tail((side.0, side.1 + 1)),
-                ]));
-            }
-        }
+        let covered = [BLUNT, SHARP].map(|angle| self.covered(angle));
+        creased(self.points.len(), &self.cells, |ends| {
+            [0, 1].map(|i| covered[i].get(&ends).copied().unwrap_or(0.0))
+        })
     }
 
     /// Of edges of cells by their ends, the part of each that sharp edges of the surface cover.
@@ -347,6 +278,88 @@ impl Gridded {
             }
         }
         Ok(samples)
+    }
+}
+
+/// The control mesh of cells whose creases are edges that sharp edges of a surface lie along. `covered` says of an edge, by its ends with the lesser first, which part of it edges sharper than [`BLUNT`] and than [`SHARP`] cover:
+/// chains that the former cover, for the most part the latter too, and that are not short.
+///
+/// # Errors
+/// Cells that make no surface.
+pub fn creased(
+    vertices: usize,
+    cells: &[[u32; 4]],
+    covered: impl Fn([u32; 2]) -> [f64; 2],
+) -> Result<Cage, SplineError> {
+    let cage = |is_crease: &dyn Fn([u32; 2]) -> bool, is_corner: Vec<bool>| {
+        let at = |(c, k): CellSide| {
+            let corners = cells[c as usize];
+            is_crease(sorted([
+                corners[usize::from(k)],
+                corners[usize::from((k + 1) & 3)],
+            ]))
+        };
+        Cage::new(vertices, cells.to_vec(), at, is_corner)
+    };
+    let none = || vec![false; vertices];
+    let all = cage(&|ends| covered(ends)[0] >= COVERED, none())?;
+    // Chains that are sharp for the most part, and long enough not to be noise if they end inside.
+    let steps = |chain: &[u32]| -> Vec<[u32; 2]> {
+        chain.windows(2).map(|w| sorted([w[0], w[1]])).collect()
+    };
+    let mut kept: Vec<Vec<u32>> = all.chains();
+    kept.retain(|chain| {
+        let steps = steps(chain);
+        2.0 * steps.iter().map(|&s| covered(s)[1]).sum::<f64>() >= steps.len() as f64
+    });
+    let mut edges: FxHashSet<[u32; 2]> = kept.iter().flat_map(|chain| steps(chain)).collect();
+    let chains = cage(&|ends| edges.contains(&ends), none())?;
+    kept = chains.chains();
+    kept.retain(|chain| {
+        let ends = [chain[0], chain[chain.len() - 1]];
+        let goes_on = ends.iter().all(|&v| chains.is_corner[v as usize]) || ends[0] == ends[1];
+        goes_on || chain.len() > SHORTEST_CREASE
+    });
+    // And what hangs together is longer than around two cells.
+    let mut sets = UnionFind::new(vertices);
+    kept.iter().for_each(|chain| {
+        chain.windows(2).for_each(|w| {
+            sets.join(w[0] as usize, w[1] as usize);
+        })
+    });
+    let mut length = vec![0; vertices];
+    for chain in &kept {
+        length[sets.find(chain[0] as usize)] += chain.len() - 1;
+    }
+    let border = chains.leaving();
+    let is_on_border = |v: u32| {
+        border[v as usize].is_some_and(|side| chains.turn_back(chains.star(side)[0]).is_none())
+    };
+    let touches: FxHashSet<usize> = kept
+        .iter()
+        .flatten()
+        .filter(|&&v| is_on_border(v))
+        .map(|&v| sets.find(v as usize))
+        .collect();
+    kept.retain(|chain| {
+        let set = sets.find(chain[0] as usize);
+        length[set] >= SHORTEST_NET || touches.contains(&set)
+    });
+    edges = kept.iter().flat_map(|chain| steps(chain)).collect();
+    // Where the limit surface would have no tangent plane, creases end an edge before.
+    loop {
+        let found = cage(&|ends| edges.contains(&ends), none())?;
+        let untidy = found.untidy_creases();
+        if untidy.is_empty() {
+            let is_corner = found.turns_around_cells();
+            return cage(&|ends| edges.contains(&ends), is_corner);
+        }
+        for side in untidy {
+            edges.remove(&sorted([
+                found.tail(side),
+                found.tail((side.0, side.1 + 1)),
+            ]));
+        }
     }
 }
 
