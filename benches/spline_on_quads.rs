@@ -6,14 +6,14 @@
 //!
 //! Reads triangles and quads near them, prints figures as JSON, and writes the surface as triangles, cell by cell. What the map says of our own quads is found by distance here:
 //!
-//! * places of samples: of the nearest point of the bilinear cells, normals counting too; the fit moves them on from there
+//! * places of samples: of the nearest point of the bilinear cells, normals counting too, and then of the fitted surface; the fit moves them on from there
 //! * creases: edges of cells that sharp edges of the mesh lie along, with the rules for chains that the atlas has
 
 use affine_atlas::geometry::deviation::Triangles;
 use affine_atlas::geometry::mesh::{
     bounding_box, cross, distance_to_segment, dot, norm, sub, triangle_area,
 };
-use affine_atlas::spline::gridded::{BLUNT, Gridded, SHARP, Sample, creased};
+use affine_atlas::spline::gridded::{ALONG, BESIDE, BLUNT, Gridded, SHARP, Sample, creased};
 use affine_atlas::spline::{Spline, fit_samples};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -27,6 +27,8 @@ fn lerp(a: Point, b: Point, t: f64) -> Point {
     [0, 1, 2].map(|i| a[i] + t * (b[i] - a[i]))
 }
 
+/// Fits; each but the first begins with places on the surface of the one before, and the best counts.
+const FITS: usize = 3;
 /// Parts of a cell along a side, two triangles each.
 const PARTS: usize = 4;
 /// A normal that turns by a right angle counts like so much distance, in sides of a mean cell …
@@ -35,10 +37,6 @@ const TURN: f64 = 0.2;
 const AWAY: f64 = 4.0;
 /// Triangles in a leaf of the tree.
 const LEAF: usize = 4;
-/// Sharp edges of the mesh that lie along an edge of cells are no farther from it, in lengths of that edge …
-const BESIDE: f64 = 0.15;
-/// … and turn by no more from it: cosine of 30°.
-const ALONG: f64 = 0.866;
 /// Places of an edge of cells that are looked at.
 const PLACES: usize = 16;
 
@@ -61,7 +59,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         positions: &positions,
         faces: &faces,
     };
-    let pieces = pieces(&points, &cells);
+    let pieces = of_cells(&points, &cells);
     let area: f64 = pieces.iter().map(|p| p.area()).sum();
     let side = (area / cells.len() as f64).sqrt();
     let sharp = [BLUNT, SHARP].map(|angle| sharp(source, angle));
@@ -70,11 +68,20 @@ fn main() -> Result<(), Box<dyn Error>> {
         [0, 1].map(|i| covered(ends, &sharp[i]))
     })?;
     let mut samples = samples(source, side)?;
-    let tree = Tree::new(pieces);
-    samples.par_iter_mut().for_each(|s| {
-        (s.cell, s.at) = tree.place(s, side);
-    });
-    let spline = fit_samples(cage, samples, source)?;
+    let mut tree = Tree::new(pieces);
+    let mut spline: Option<Spline> = None;
+    for _ in 0..FITS {
+        samples.par_iter_mut().for_each(|s| {
+            (s.cell, s.at) = tree.place(s, side);
+        });
+        let found = fit_samples(cage.clone(), samples.clone(), source)?;
+        tree = Tree::new(of_surface(&found));
+        let rms = |s: &Spline| s.deviation.map_or(f64::INFINITY, |d| d.rms);
+        if spline.as_ref().is_none_or(|best| rms(&found) < rms(best)) {
+            spline = Some(found);
+        }
+    }
+    let spline = spline.ok_or("no fit")?;
     println!("{}", figures(&spline));
     write(surface, &spline, middle)
 }
@@ -194,6 +201,18 @@ struct Piece {
 }
 
 impl Piece {
+    fn new(corners: [Point; 3], cell: u32, at: [[f64; 2]; 3]) -> Self {
+        let [a, b, c] = corners;
+        let normal = cross(sub(b, a), sub(c, a));
+        let length = norm(normal);
+        Self {
+            corners,
+            normal: normal.map(|x| if length > 0.0 { x / length } else { 0.0 }),
+            cell,
+            at,
+        }
+    }
+
     fn area(&self) -> f64 {
         triangle_area(self.corners)
     }
@@ -231,34 +250,41 @@ impl Piece {
 }
 
 /// Triangles of bilinear cells.
-fn pieces(points: &[Point], cells: &[[u32; 4]]) -> Vec<Piece> {
+fn of_cells(points: &[Point], cells: &[[u32; 4]]) -> Vec<Piece> {
     let mut pieces = Vec::with_capacity(cells.len() * 2 * PARTS * PARTS);
     for (cell, corners) in (0..).zip(cells) {
         let [p, q, r, s] = corners.map(|v| points[v as usize]);
-        let place = |x: usize, y: usize| [x, y].map(|i| i as f64 / PARTS as f64);
-        for i in 0..PARTS * PARTS {
-            let (x, y) = (i % PARTS, i / PARTS);
-            let [a, b, c, d] = [
-                place(x, y),
-                place(x + 1, y),
-                place(x + 1, y + 1),
-                place(x, y + 1),
-            ];
-            for at in [[a, b, c], [a, c, d]] {
-                let corners = at.map(|[u, v]| lerp(lerp(p, q, u), lerp(s, r, u), v));
-                let [a, b, c] = corners;
-                let normal = cross(sub(b, a), sub(c, a));
-                let length = norm(normal);
-                pieces.push(Piece {
-                    corners,
-                    normal: normal.map(|x| if length > 0.0 { x / length } else { 0.0 }),
-                    cell,
-                    at,
-                });
-            }
-        }
+        let of = |at: [[f64; 2]; 3]| {
+            let corners = at.map(|[u, v]| lerp(lerp(p, q, u), lerp(s, r, u), v));
+            Piece::new(corners, cell, at)
+        };
+        pieces.extend(triangles(PARTS).map(of));
     }
     pieces
+}
+
+/// Triangles of a fitted surface.
+fn of_surface(spline: &Spline) -> Vec<Piece> {
+    let all = spline.tessellation();
+    let cells = all.faces.chunks(2 * all.parts * all.parts);
+    let of = |(cell, faces): (u32, &[[u32; 3]])| {
+        let pieces = faces.iter().zip(triangles(all.parts)).map(|(f, at)| {
+            let corners = f.map(|v| all.points[v as usize]);
+            Piece::new(corners, cell, at)
+        });
+        pieces.collect::<Vec<_>>()
+    };
+    (0..).zip(cells).flat_map(of).collect()
+}
+
+/// Corners of the triangles of a cell, two a part and row by row.
+fn triangles(parts: usize) -> impl Iterator<Item = [[f64; 2]; 3]> {
+    let place = move |x: usize, y: usize| [x, y].map(|i| i as f64 / parts as f64);
+    (0..parts * parts).flat_map(move |i| {
+        let (x, y) = (i % parts, i / parts);
+        let (a, c) = (place(x, y), place(x + 1, y + 1));
+        [[a, place(x + 1, y), c], [a, c, place(x, y + 1)]]
+    })
 }
 
 /// Pieces in nested boxes.

@@ -21,7 +21,7 @@ import numpy as np
 from quads import ask_quadriflow, read_obj, resource_children, sampled, write_obj
 
 WITHIN = 0.02
-TRIES = 8
+TRIES = 16
 
 
 def bench():
@@ -90,6 +90,25 @@ def ours(program, mesh, folder, cells):
     return component, read_glb(out / f"{component['name']}.glb"), seconds
 
 
+def as_many(python, plain, path, wanted):
+    """Asks QuadriFlow for so many points; gives seconds, or a message."""
+    asked = {}
+    cells = wanted
+    while len(asked) < TRIES:
+        found = ask_quadriflow(python, plain, path, cells)
+        if found is None:
+            return "failed"
+        points, _, seconds = found
+        if abs(len(points) - wanted) <= WITHIN * wanted:
+            return seconds
+        asked[cells] = len(points)
+        cells = round(cells * wanted / len(points))
+        # Numbers that it makes jump.
+        while cells in asked:
+            cells += round(WITHIN * wanted / 2)
+    return f"{min(asked.values(), key=lambda n: abs(n - wanted))} points at the nearest"
+
+
 def on_quads(fitter, plain, quads, folder):
     """The fit on quads, and what it prints; a message where there is none."""
     path = folder / f"{quads.stem}.surface.obj"
@@ -135,19 +154,10 @@ def main(program, python, folder, cells, meshes):
         figures, surface, seconds = ours(program, mesh, folder, cells)
         row("affine-atlas", figures, surface, "%.1f" % seconds)
         made = {"the same without its map": (same_quads(program, mesh, folder, cells), "")}
-        wanted = asked = figures["control_points"]
         path = folder / f"{mesh.stem}.quadriflow.obj"
-        message = "failed"
-        for _ in range(TRIES):
-            found = ask_quadriflow(python, plain, path, asked)
-            if found is None:
-                break
-            points, polygons, seconds = found
-            if abs(len(points) - wanted) <= WITHIN * wanted:
-                made["QuadriFlow"] = path, "%.1f + " % seconds
-                break
-            message = f"{len(points)} points at the nearest"
-            asked = round(asked * wanted / len(points))
+        found = as_many(python, plain, path, figures["control_points"])
+        if isinstance(found, float):
+            made["QuadriFlow"] = path, "%.1f + " % found
         for name, (path, before) in made.items():
             result = on_quads(fitter, plain, path, folder)
             if isinstance(result, str):
@@ -156,7 +166,7 @@ def main(program, python, folder, cells, meshes):
             figures, surface, seconds = result
             row(name, figures, surface, before + "%.1f" % seconds)
         if "QuadriFlow" not in made:
-            print(f"| {mesh.stem} | QuadriFlow | {message} |", flush=True)
+            print(f"| {mesh.stem} | QuadriFlow | {found} |", flush=True)
 
 
 if __name__ == "__main__":

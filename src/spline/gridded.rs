@@ -73,8 +73,14 @@ const PART: f64 = 0.75;
 const SMALL: f64 = 0.25;
 /// Parts along a side of a face, at most.
 const MOST_PARTS: f64 = 64.0;
-/// How far from a line of the grid an edge that lies on it may be, cells.
-const ON_LINE: f64 = 1e-9;
+/// How far from an edge of cells one that lies along it may be, cells …
+pub const BESIDE: f64 = 0.1;
+/// … and how much it may turn from it: cosine of 30°.
+pub const ALONG: f64 = 0.866;
+/// Places of an edge of cells that are looked at.
+const PLACES: u32 = 16;
+/// How far an edge goes on, cells.
+const ROUNDING: f64 = 1e-9;
 
 /// Cells by block, column and row.
 struct Cells(FxHashMap<(u32, [u32; 2]), u32>);
@@ -135,7 +141,7 @@ impl Gridded {
         let cells = Cells::new(self);
         let normals: Vec<[f64; 3]> = self.faces.iter().map(|f| self.doubled(f)).collect();
         let mut beside: FxHashMap<[u32; 2], u32> = FxHashMap::default();
-        let mut covered: FxHashMap<[u32; 2], f64> = FxHashMap::default();
+        let mut places: FxHashMap<[u32; 2], u16> = FxHashMap::default();
         for (f, corners) in self.faces.iter().enumerate() {
             for k in 0..3 {
                 let [a, b] = [corners[k], corners[(k + 1) % 3]];
@@ -147,44 +153,71 @@ impl Gridded {
                 if norm(cross(m, n)).atan2(dot(m, n)) <= sharp {
                     continue;
                 }
-                let [p, q] = [self.uv[f][k], self.uv[f][(k + 1) % 3]];
-                if let Some((ends, part)) = self.on_line(&cells, self.block[f], p, q) {
-                    *covered.entry(ends).or_default() += part;
+                let ends = [self.uv[f][k], self.uv[f][(k + 1) % 3]];
+                for (edge, marks) in self.along_edges(&cells, self.block[f], ends) {
+                    *places.entry(edge).or_default() |= marks;
                 }
             }
         }
-        covered
+        let part = |marks: u16| f64::from(marks.count_ones()) / f64::from(PLACES);
+        places.into_iter().map(|(e, m)| (e, part(m))).collect()
     }
 
-    /// The edge of cells that a segment in a block lies on, and how much of it that is.
-    fn on_line(
+    /// The edges of cells that a segment in a block lies along, and at which of [`PLACES`] places of each from its lesser end on.
+    fn along_edges(
         &self,
         cells: &Cells,
         block: u32,
-        p: [f64; 2],
-        q: [f64; 2],
-    ) -> Option<([u32; 2], f64)> {
-        let on = |i: usize| {
-            let line = p[i].round();
-            (p[i] - line).abs() <= ON_LINE && (q[i] - line).abs() <= ON_LINE
+        [p, q]: [[f64; 2]; 2],
+    ) -> Vec<([u32; 2], u16)> {
+        let d = [q[0] - p[0], q[1] - p[1]];
+        let length = d[0].hypot(d[1]);
+        let Some(along) = (0..2).find(|&i| d[i].abs() >= ALONG * length && length > 0.0) else {
+            return Vec::new();
         };
-        let along = match (on(0), on(1)) {
-            (true, false) => 1,
-            (false, true) => 0,
-            _ => return None,
-        };
-        let middle = [0, 1].map(|i| (p[i] + q[i]) / 2.0);
-        let (cell, at) = cells.find(block, middle)?;
-        let corners = self.cells[cell as usize];
-        let far = at[1 - along] > 0.5;
-        let ends = match (along, far) {
-            (0, false) => [0, 1],
-            (0, true) => [3, 2],
-            (_, false) => [0, 3],
-            (_, true) => [1, 2],
-        };
-        let [a, b] = ends.map(|k: usize| corners[k]);
-        Some(([a.min(b), a.max(b)], (p[along] - q[along]).abs()))
+        let at = |t: f64| [0, 1].map(|i| p[i] + t * d[i]);
+        // Between lines of the grid.
+        let mut cuts = vec![0.0, 1.0];
+        for i in [0, 1] {
+            let (low, high) = (
+                p[i].min(q[i]).floor() as i64 + 1,
+                p[i].max(q[i]).ceil() as i64,
+            );
+            cuts.extend((low..high).map(|line| (line as f64 - p[i]) / d[i]));
+        }
+        cuts.sort_by(f64::total_cmp);
+        let mut found = Vec::new();
+        for w in cuts.windows(2) {
+            let middle = at((w[0] + w[1]) / 2.0);
+            let Some((cell, inside)) = cells.find(block, middle) else {
+                continue;
+            };
+            let ends = [w[0], w[1]].map(|t| {
+                let there = at(t);
+                [0, 1].map(|i| there[i] - middle[i] + inside[i])
+            });
+            let away = ends.map(|e| e[1 - along]);
+            let is_far = inside[1 - along] > 0.5;
+            let line = if is_far { 1.0 } else { 0.0 };
+            if away.iter().any(|x| (x - line).abs() > BESIDE) {
+                continue;
+            }
+            let edge = match (along, is_far) {
+                (0, false) => [0, 1],
+                (0, true) => [3, 2],
+                (_, false) => [0, 3],
+                (_, true) => [1, 2],
+            };
+            let [a, b] = edge.map(|k: usize| self.cells[cell as usize][k]);
+            let [x, y] = ends.map(|e| if a < b { e[along] } else { 1.0 - e[along] });
+            let (low, high) = (x.min(y) - ROUNDING, x.max(y) + ROUNDING);
+            let marks = (0..PLACES).filter(|&i| {
+                let place = (f64::from(i) + 0.5) / f64::from(PLACES);
+                low <= place && place <= high
+            });
+            found.push((sorted([a, b]), marks.fold(0, |sum, i| sum | 1 << i)));
+        }
+        found
     }
 
     /// Of the corners of faces, means of the normals of the faces around a vertex, by area; of those that lie within [`SHARP`] of the face.
