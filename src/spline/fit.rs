@@ -15,8 +15,8 @@ use rayon::prelude::*;
 
 /// Weight of squares of second differences beside those of distances.
 const FAIR: f64 = 1e-6;
-/// Fits, one after each correction of places and one before.
-const ROUNDS: usize = 6;
+/// Fits, one after each correction of places and one before. More of them follow noise.
+const ROUNDS: usize = 12;
 /// Samples this many times as far off as the root mean square count twice …
 const FAR: f64 = 4.0;
 /// … and none more often than this.
@@ -175,7 +175,8 @@ impl<'a> Fitter<'a> {
         near.for_each(|(fairness, _)| *fairness *= FAIRER);
     }
 
-    /// Fits, and moves the places of samples to the nearest points, in turn; samples that are far off count more in later rounds. Where a cell folds, samples stay where the map has them, and
+    /// Fits, and moves the places of samples to the nearest points, in turn. Each step alone goes a small part of the way, since places slide along the surface slowly; so places are those on a
+    /// surface that goes on past the last one by part of the last step (Y. Nesterov 1983). Samples that are far off count more in later rounds. Where a cell folds, samples stay where the map has them, and
     /// where it still does it is made fairer.
     ///
     /// # Errors
@@ -184,8 +185,17 @@ impl<'a> Fitter<'a> {
         let given: Vec<Place> = samples.iter().map(Sample::place).collect();
         let mut folds = vec![0usize; self.cage.cells.len()];
         let mut control = self.solve(samples)?;
+        let mut before = control.clone();
         for round in 1..=ROUNDS + MOST_SMOOTHINGS {
-            let limit = Limit::new(self.cage, self.evaluator, &control);
+            // The last places are on the surface itself.
+            let part = match round < ROUNDS {
+                true => (round - 1) as f64 / (round + 2) as f64,
+                false => 0.0,
+            };
+            let points = control.iter().zip(&before);
+            let points = points.map(|(c, b)| [0, 1, 2].map(|i| c[i] + part * (c[i] - b[i])));
+            let points: Vec<[f64; 3]> = points.collect();
+            let limit = Limit::new(self.cage, self.evaluator, &points);
             let mut moved = samples.to_vec();
             move_places(&limit, &mut moved);
             let folded = match round {
@@ -212,7 +222,7 @@ impl<'a> Fitter<'a> {
             }
             let again = folded.into_iter().filter(|&cell| folds[cell as usize] > 1);
             self.smooth(&again.collect::<Vec<u32>>(), round > ROUNDS + 1);
-            control = self.solve(samples)?;
+            before = std::mem::replace(&mut control, self.solve(samples)?);
         }
         Ok(control)
     }
