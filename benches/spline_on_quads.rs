@@ -6,7 +6,7 @@
 //!
 //! Reads triangles and quads near them, prints figures as JSON, and writes the surface as triangles, cell by cell. What the map says of our own quads is found by distance here:
 //!
-//! * places of samples: of the nearest point of the bilinear cells, normals counting too, and then of the fitted surface; the fit moves them on from there
+//! * places of samples: of the nearest point of the bilinear cells, normals counting too; the fit moves them on from there
 //! * creases: edges of cells that sharp edges of the mesh lie along, with the rules for chains that the atlas has
 
 use affine_atlas::geometry::deviation::Triangles;
@@ -27,8 +27,6 @@ fn lerp(a: Point, b: Point, t: f64) -> Point {
     [0, 1, 2].map(|i| a[i] + t * (b[i] - a[i]))
 }
 
-/// Fits; each but the first begins with places on the surface of the one before, and the best counts.
-const FITS: usize = 3;
 /// Parts of a cell along a side, two triangles each.
 const PARTS: usize = 4;
 /// A normal that turns by a right angle counts like so much distance, in sides of a mean cell …
@@ -68,20 +66,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         [0, 1].map(|i| covered(ends, &sharp[i]))
     })?;
     let mut samples = samples(source, side)?;
-    let mut tree = Tree::new(pieces);
-    let mut spline: Option<Spline> = None;
-    for _ in 0..FITS {
-        samples.par_iter_mut().for_each(|s| {
-            (s.cell, s.at) = tree.place(s, side);
-        });
-        let found = fit_samples(cage.clone(), samples.clone(), source)?;
-        tree = Tree::new(of_surface(&found));
-        let rms = |s: &Spline| s.deviation.map_or(f64::INFINITY, |d| d.rms);
-        if spline.as_ref().is_none_or(|best| rms(&found) < rms(best)) {
-            spline = Some(found);
-        }
-    }
-    let spline = spline.ok_or("no fit")?;
+    let tree = Tree::new(pieces);
+    samples.par_iter_mut().for_each(|s| {
+        (s.cell, s.at) = tree.place(s, side);
+    });
+    let spline = fit_samples(cage, samples, source)?;
     println!("{}", figures(&spline));
     write(surface, &spline, middle)
 }
@@ -261,20 +250,6 @@ fn of_cells(points: &[Point], cells: &[[u32; 4]]) -> Vec<Piece> {
         pieces.extend(triangles(PARTS).map(of));
     }
     pieces
-}
-
-/// Triangles of a fitted surface.
-fn of_surface(spline: &Spline) -> Vec<Piece> {
-    let all = spline.tessellation();
-    let cells = all.faces.chunks(2 * all.parts * all.parts);
-    let of = |(cell, faces): (u32, &[[u32; 3]])| {
-        let pieces = faces.iter().zip(triangles(all.parts)).map(|(f, at)| {
-            let corners = f.map(|v| all.points[v as usize]);
-            Piece::new(corners, cell, at)
-        });
-        pieces.collect::<Vec<_>>()
-    };
-    (0..).zip(cells).flat_map(of).collect()
 }
 
 /// Corners of the triangles of a cell, two a part and row by row.

@@ -186,15 +186,19 @@ impl<'a> Fitter<'a> {
         let mut folds = vec![0usize; self.cage.cells.len()];
         let mut control = self.solve(samples)?;
         let mut before = control.clone();
+        let is_on_border = self.cage.on_border();
         for round in 1..=ROUNDS + MOST_SMOOTHINGS {
-            // The last places are on the surface itself.
+            // The last places are on the surface itself; and beyond the border nothing holds it.
             let part = match round < ROUNDS {
                 true => (round - 1) as f64 / (round + 2) as f64,
                 false => 0.0,
             };
-            let points = control.iter().zip(&before);
-            let points = points.map(|(c, b)| [0, 1, 2].map(|i| c[i] + part * (c[i] - b[i])));
-            let points: Vec<[f64; 3]> = points.collect();
+            let past = |v: usize| {
+                let (c, b) = (control[v], before[v]);
+                let part = if is_on_border[v] { 0.0 } else { part };
+                [0, 1, 2].map(|i| c[i] + part * (c[i] - b[i]))
+            };
+            let points: Vec<[f64; 3]> = (0..control.len()).map(past).collect();
             let limit = Limit::new(self.cage, self.evaluator, &points);
             let mut moved = samples.to_vec();
             move_places(&limit, &mut moved);

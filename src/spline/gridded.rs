@@ -364,14 +364,11 @@ pub fn creased(
     for chain in &kept {
         length[sets.find(chain[0] as usize)] += chain.len() - 1;
     }
-    let border = chains.leaving();
-    let is_on_border = |v: u32| {
-        border[v as usize].is_some_and(|side| chains.turn_back(chains.star(side)[0]).is_none())
-    };
+    let is_on_border = chains.on_border();
     let touches: FxHashSet<usize> = kept
         .iter()
         .flatten()
-        .filter(|&&v| is_on_border(v))
+        .filter(|&&v| is_on_border[v as usize])
         .map(|&v| sets.find(v as usize))
         .collect();
     kept.retain(|chain| {
