@@ -3,13 +3,13 @@
     (numpy, libigl, bpy: see quads.py)
     python3 benches/peers/splines.py PROGRAM FOLDER/bin/python DIR CELLS MESH...
 
-Fits every mesh with PROGRAM (affine-atlas), asks QuadriFlow for quads until there are as many control points within 2 %, and fits a surface with them (bench `spline_on_quads`, which finds places and creases by distance).
+Fits every mesh with PROGRAM (affine-atlas), asks QuadriFlow for quads until three of its meshes have as many control points within 2 %, and fits surfaces with them, of which the one with the least RMS counts (bench `spline_on_quads`, which finds places and creases by distance).
 The same is done with the quads of `affine-atlas build`, their map thrown away: what that loses or gains is what the bench, and not QuadriFlow's quads, does. Leaves quads and surfaces in DIR and prints a table:
 
 * RMS, max: distances both ways between the source and the surface (4 to 8 parts along a side of a cell), 1e-3 of the diagonal of the bounding box
 * folded: cells in which a triangle of the surface looks away from the nearest point of the source (normals of vertices, interpolated)
 * creases: edges of cells inside that are creases
-* s: CPU seconds; of QuadriFlow those of the quads, and of the fit
+* s: CPU seconds; of the quads, and of finding places and the fit
 """
 
 import json
@@ -22,6 +22,7 @@ from quads import ask_quadriflow, read_obj, resource_children, sampled, write_ob
 
 WITHIN = 0.02
 TRIES = 16
+MESHES = 3
 
 
 def bench():
@@ -90,23 +91,26 @@ def ours(program, mesh, folder, cells):
     return component, read_glb(out / f"{component['name']}.glb"), seconds
 
 
-def as_many(python, plain, path, wanted):
-    """Asks QuadriFlow for so many points; gives seconds, or a message."""
-    asked = {}
-    cells = wanted
-    while len(asked) < TRIES:
-        found = ask_quadriflow(python, plain, path, cells)
-        if found is None:
+def as_many(python, plain, folder, wanted):
+    """Quad meshes of QuadriFlow with so many points, and the seconds of each; else a message."""
+    asked, found = set(), []
+    cells, nearest = wanted, None
+    while len(asked) < TRIES and len(found) < MESHES:
+        path = folder / f"{plain.name.split('.')[0]}.quadriflow.{cells}.obj"
+        made = ask_quadriflow(python, plain, path, cells)
+        if made is None:
             return "failed"
-        points, _, seconds = found
+        points, _, seconds = made
+        asked.add(cells)
         if abs(len(points) - wanted) <= WITHIN * wanted:
-            return seconds
-        asked[cells] = len(points)
+            found.append((path, seconds))
+        if nearest is None or abs(len(points) - wanted) < abs(nearest - wanted):
+            nearest = len(points)
         cells = round(cells * wanted / len(points))
-        # Numbers that it makes jump.
+        # Its numbers jump.
         while cells in asked:
-            cells += round(WITHIN * wanted / 2)
-    return f"{min(asked.values(), key=lambda n: abs(n - wanted))} points at the nearest"
+            cells += round(WITHIN * wanted / 4)
+    return found or f"{nearest} points at the nearest"
 
 
 def on_quads(fitter, plain, quads, folder):
@@ -122,7 +126,7 @@ def on_quads(fitter, plain, quads, folder):
 def same_quads(program, mesh, folder, cells):
     """The quads that `fit` begins with."""
     out = folder / "atlas"
-    said, _ = run(
+    said, seconds = run(
         *[program, "build", "--quiet", "--force", mesh, "--out", out, "--set", "images.domain=grid"],
         *["--set", f"grid.cells={cells}", "--set", "pictures.enabled=false", "--set", "report.enabled=false"],
     )
@@ -130,7 +134,7 @@ def same_quads(program, mesh, folder, cells):
         raise SystemExit(said.stderr)
     path = folder / f"{mesh.stem}.own.obj"
     write_obj(path, *read_obj(next(out.glob(f"{mesh.stem}/quads.obj"))))
-    return path
+    return path, seconds
 
 
 def main(program, python, folder, cells, meshes):
@@ -153,20 +157,20 @@ def main(program, python, folder, cells, meshes):
 
         figures, surface, seconds = ours(program, mesh, folder, cells)
         row("affine-atlas", figures, surface, "%.1f" % seconds)
-        made = {"the same without its map": (same_quads(program, mesh, folder, cells), "")}
-        path = folder / f"{mesh.stem}.quadriflow.obj"
-        found = as_many(python, plain, path, figures["control_points"])
-        if isinstance(found, float):
-            made["QuadriFlow"] = path, "%.1f + " % found
-        for name, (path, before) in made.items():
-            result = on_quads(fitter, plain, path, folder)
-            if isinstance(result, str):
-                print(f"| {mesh.stem} | {name} | {result} |", flush=True)
-                continue
-            figures, surface, seconds = result
-            row(name, figures, surface, before + "%.1f" % seconds)
-        if "QuadriFlow" not in made:
+        def least(name, quads):
+            results = [(on_quads(fitter, plain, path, folder), seconds) for path, seconds in quads]
+            fitted = [(result, seconds) for result, seconds in results if not isinstance(result, str)]
+            if not fitted:
+                return print(f"| {mesh.stem} | {name} | {results[0][0]} |", flush=True)
+            (figures, surface, last), first = min(fitted, key=lambda r: r[0][0]["both_ways_rms"])
+            row(name, figures, surface, f"{first:.1f} + {last:.1f}")
+
+        least("the same without its map", [same_quads(program, mesh, folder, cells)])
+        found = as_many(python, plain, folder, figures["control_points"])
+        if isinstance(found, str):
             print(f"| {mesh.stem} | QuadriFlow | {found} |", flush=True)
+        else:
+            least("QuadriFlow", found)
 
 
 if __name__ == "__main__":
