@@ -15,8 +15,8 @@ use rayon::prelude::*;
 
 /// Weight of squares of second differences beside those of distances.
 const FAIR: f64 = 1e-6;
-/// Fits, one after each correction of places and one before.
-const ROUNDS: usize = 6;
+/// Fits, one after each correction of places and one before. More of them follow noise.
+const ROUNDS: usize = 12;
 /// Samples this many times as far off as the root mean square count twice …
 const FAR: f64 = 4.0;
 /// … and none more often than this.
@@ -175,7 +175,8 @@ impl<'a> Fitter<'a> {
         near.for_each(|(fairness, _)| *fairness *= FAIRER);
     }
 
-    /// Fits, and moves the places of samples to the nearest points, in turn; samples that are far off count more in later rounds. Where a cell folds, samples stay where the map has them, and
+    /// Fits, and moves the places of samples to the nearest points, in turn. Each step alone goes a small part of the way, since places slide along the surface slowly; so places are those on a
+    /// surface that goes on past the last one by part of the last step (Y. Nesterov 1983). Samples that are far off count more in later rounds. Where a cell folds, samples stay where the map has them, and
     /// where it still does it is made fairer.
     ///
     /// # Errors
@@ -184,10 +185,24 @@ impl<'a> Fitter<'a> {
         let given: Vec<Place> = samples.iter().map(Sample::place).collect();
         let mut folds = vec![0usize; self.cage.cells.len()];
         let mut control = self.solve(samples)?;
+        let mut before = control.clone();
+        let kinds = self.cage.kinds();
         for round in 1..=ROUNDS + MOST_SMOOTHINGS {
-            let limit = Limit::new(self.cage, self.evaluator, &control);
+            // The last places are on the surface itself; and beyond borders, creases and corners nothing holds it.
+            let part = match round < ROUNDS {
+                true => (round - 1) as f64 / (round + 2) as f64,
+                false => 0.0,
+            };
+            let past = |v: usize| {
+                let (c, b) = (control[v], before[v]);
+                let part = if kinds[v] == Kind::Smooth { part } else { 0.0 };
+                [0, 1, 2].map(|i| c[i] + part * (c[i] - b[i]))
+            };
+            let points: Vec<[f64; 3]> = (0..control.len()).map(past).collect();
+            let limit = Limit::new(self.cage, self.evaluator, &points);
             let mut moved = samples.to_vec();
             move_places(&limit, &mut moved);
+            search_again(&limit, &mut moved, &given);
             let folded = match round {
                 1 => Vec::new(),
                 _ => shape(&limit, &moved).1,
@@ -212,7 +227,7 @@ impl<'a> Fitter<'a> {
             }
             let again = folded.into_iter().filter(|&cell| folds[cell as usize] > 1);
             self.smooth(&again.collect::<Vec<u32>>(), round > ROUNDS + 1);
-            control = self.solve(samples)?;
+            before = std::mem::replace(&mut control, self.solve(samples)?);
         }
         Ok(control)
     }
@@ -220,18 +235,41 @@ impl<'a> Fitter<'a> {
 
 /// Weights of samples for the next fit: more where they are far off.
 fn weigh(limit: &Limit<'_>, samples: &mut [Sample]) {
-    let off: Vec<f64> = samples
-        .par_iter()
-        .map(|s| norm(sub(limit.at(s.cell, s.at).point, s.point)))
-        .collect();
-    let area: f64 = samples.iter().map(|s| s.area).sum();
-    let squares: f64 = samples.iter().zip(&off).map(|(s, d)| s.area * d * d).sum();
-    let large = FAR * (squares / area).sqrt();
+    let off = distances(limit, samples);
+    let large = far(samples, &off);
     if large > 0.0 {
         for (sample, d) in samples.iter_mut().zip(&off) {
             sample.weight = (1.0 + (d / large).powi(2)).min(MOST_WEIGHT);
         }
     }
+}
+
+/// Searches from other places for samples that are far off: a search may end where only near places are farther.
+fn search_again(limit: &Limit<'_>, samples: &mut [Sample], given: &[Place]) {
+    let off = distances(limit, samples);
+    let large = far(samples, &off);
+    let all = samples.par_iter_mut().zip(given).zip(off);
+    all.filter(|(_, off)| *off > large)
+        .for_each(|((sample, given), least)| {
+            let place = limit.nearest(sample.point, *given);
+            let off = norm(sub(limit.at(place.cell, place.at).point, sample.point));
+            if off < least {
+                (sample.cell, sample.at) = (place.cell, place.at);
+            }
+        });
+}
+
+/// Of each sample, how far it is from its place.
+fn distances(limit: &Limit<'_>, samples: &[Sample]) -> Vec<f64> {
+    let off = |s: &Sample| norm(sub(limit.at(s.cell, s.at).point, s.point));
+    samples.par_iter().map(off).collect()
+}
+
+/// What is far off: [`FAR`] times the root of the mean square of distances.
+fn far(samples: &[Sample], off: &[f64]) -> f64 {
+    let area: f64 = samples.iter().map(|s| s.area).sum();
+    let squares: f64 = samples.iter().zip(off).map(|(s, d)| s.area * d * d).sum();
+    FAR * (squares / area).sqrt()
 }
 
 /// Moves the places of samples to the nearest points of a surface.
