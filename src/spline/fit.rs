@@ -7,16 +7,17 @@ use super::cage::{Cage, Kind};
 use super::error::SplineError;
 use super::evaluator::Evaluator;
 use super::gridded::Sample;
-use super::limit::{Limit, Place};
+use super::limit::{Limit, MOST_STEPS, Place};
 use super::measure::shape;
 use crate::flow::solve::SymmetricSolver;
-use crate::geometry::mesh::{norm, sub};
 use rayon::prelude::*;
 
 /// Weight of squares of second differences beside those of distances.
 const FAIR: f64 = 1e-6;
 /// Fits, one after each correction of places and one before. More of them follow noise.
 const ROUNDS: usize = 12;
+/// Rounds at the end in which samples are moved all the way.
+const LAST_ROUNDS: usize = 2;
 /// Samples this many times as far off as the root mean square count twice …
 const FAR: f64 = 4.0;
 /// … and none more often than this.
@@ -201,8 +202,14 @@ impl<'a> Fitter<'a> {
             let points: Vec<[f64; 3]> = (0..control.len()).map(past).collect();
             let limit = Limit::new(self.cage, self.evaluator, &points);
             let mut moved = samples.to_vec();
-            move_places(&limit, &mut moved);
-            search_again(&limit, &mut moved, &given);
+            // What a step leaves, the next round takes.
+            let steps = if round + LAST_ROUNDS > ROUNDS {
+                MOST_STEPS
+            } else {
+                1
+            };
+            let mut off = move_places(&limit, &mut moved, steps);
+            search_again(&limit, &mut moved, &given, &mut off);
             let folded = match round {
                 1 => Vec::new(),
                 _ => shape(&limit, &moved).1,
@@ -215,7 +222,7 @@ impl<'a> Fitter<'a> {
             folded.iter().for_each(|&cell| folds[cell as usize] += 1);
             if round < ROUNDS {
                 samples.copy_from_slice(&moved);
-                weigh(&limit, samples);
+                weigh(samples, &off);
             }
             for (sample, place) in samples.iter_mut().zip(&given) {
                 if [place.cell, sample.cell]
@@ -234,35 +241,26 @@ impl<'a> Fitter<'a> {
 }
 
 /// Weights of samples for the next fit: more where they are far off.
-fn weigh(limit: &Limit<'_>, samples: &mut [Sample]) {
-    let off = distances(limit, samples);
-    let large = far(samples, &off);
+fn weigh(samples: &mut [Sample], off: &[f64]) {
+    let large = far(samples, off);
     if large > 0.0 {
-        for (sample, d) in samples.iter_mut().zip(&off) {
+        for (sample, d) in samples.iter_mut().zip(off) {
             sample.weight = (1.0 + (d / large).powi(2)).min(MOST_WEIGHT);
         }
     }
 }
 
 /// Searches from other places for samples that are far off: a search may end where only near places are farther.
-fn search_again(limit: &Limit<'_>, samples: &mut [Sample], given: &[Place]) {
-    let off = distances(limit, samples);
-    let large = far(samples, &off);
+fn search_again(limit: &Limit<'_>, samples: &mut [Sample], given: &[Place], off: &mut [f64]) {
+    let large = far(samples, off);
     let all = samples.par_iter_mut().zip(given).zip(off);
-    all.filter(|(_, off)| *off > large)
+    all.filter(|(_, off)| **off > large)
         .for_each(|((sample, given), least)| {
-            let place = limit.nearest(sample.point, *given);
-            let off = norm(sub(limit.at(place.cell, place.at).point, sample.point));
-            if off < least {
-                (sample.cell, sample.at) = (place.cell, place.at);
+            let (place, off) = limit.nearest(sample.point, *given, MOST_STEPS);
+            if off < *least {
+                (sample.cell, sample.at, *least) = (place.cell, place.at, off);
             }
         });
-}
-
-/// Of each sample, how far it is from its place.
-fn distances(limit: &Limit<'_>, samples: &[Sample]) -> Vec<f64> {
-    let off = |s: &Sample| norm(sub(limit.at(s.cell, s.at).point, s.point));
-    samples.par_iter().map(off).collect()
 }
 
 /// What is far off: [`FAR`] times the root of the mean square of distances.
@@ -272,14 +270,15 @@ fn far(samples: &[Sample], off: &[f64]) -> f64 {
     FAR * (squares / area).sqrt()
 }
 
-/// Moves the places of samples to the nearest points of a surface.
-pub fn move_places(limit: &Limit<'_>, samples: &mut [Sample]) {
-    samples.par_chunks_mut(RUN).for_each(|run| {
-        for sample in run {
-            let place = limit.nearest(sample.point, sample.place());
-            (sample.cell, sample.at) = (place.cell, place.at);
-        }
+/// Moves the places of samples to the nearest points of a surface, in so many steps at most; the distances that are left.
+fn move_places(limit: &Limit<'_>, samples: &mut [Sample], steps: usize) -> Vec<f64> {
+    let all = samples.par_iter_mut().with_min_len(RUN);
+    let moved = all.map(|sample| {
+        let (place, off) = limit.nearest(sample.point, sample.place(), steps);
+        (sample.cell, sample.at) = (place.cell, place.at);
+        off
     });
+    moved.collect()
 }
 
 /// Second differences along both lines through a regular point, along a crease, and from the mean of the neighbours of an irregular point.
