@@ -6,8 +6,9 @@ use crate::geometry::mesh::{bounding_box, distance};
 use crate::product::{MeanMax, Quality};
 use crate::rebuild::{Images, rebuild};
 
-/// Samples on each side for each face of the source, and the range that they are held to.
-const SAMPLES_OF_FACE: usize = 2;
+/// Samples on each side for each face of the source, and the range that they are held to. On six models the PSNR is then within 1.1 dB of what
+/// 400,000 samples give, on five of them within 0.7 dB; where the error sits in few places it is off by more than where it is spread.
+const SAMPLES_OF_FACE: usize = 4;
 const SAMPLES: [usize; 2] = [4_000, 10_000];
 /// Samples for each vertex that is tested: these matter for the largest distance only.
 const SAMPLES_OF_VERTEX: usize = 4;

@@ -206,12 +206,17 @@ pub fn weighted_quantile(values: &[(f64, f64)], share: f64) -> f64 {
 /// Share of dark cells between these ends along both axes, of so many cells a unit; half where there is no board.
 fn dark_share([x, y]: [[f64; 2]; 2], per_cell: f64) -> f64 {
     // Along each axis the mean of a wave of −1 and 1, from its integral; their product is the board.
-    let wave = |[low, high]: [f64; 2]| {
-        let (low, width) = (low * per_cell, ((high - low) * per_cell).max(1e-6));
-        let integral = |x: f64| (0.5 * x - floor(0.5 * x) - 0.5).abs();
-        (integral(low) - integral(low + width), width)
-    };
-    let ((of_x, wide), (of_y, high)) = (wave(x), wave(y));
+    let in_cells = |[low, high]: [f64; 2]| (low * per_cell, ((high - low) * per_cell).max(1e-6));
+    let ((left, wide), (bottom, high)) = (in_cells(x), in_cells(y));
+    let (column, row) = (floor(left), floor(bottom));
+    // Mostly there is one cell.
+    if left + wide < column + 1.0 && bottom + high < row + 1.0 {
+        let half = 0.5 * (column + row);
+        return 2.0 * (half - floor(half));
+    }
+    let integral = |x: f64| (0.5 * x - floor(0.5 * x) - 0.5).abs();
+    let of_x = integral(left) - integral(left + wide);
+    let of_y = integral(bottom) - integral(bottom + high);
     let dark = 0.5 - 2.0 * of_x * of_y / (wide * high);
     if dark.is_finite() { dark } else { 0.5 }
 }

@@ -56,8 +56,8 @@ pub fn to_bytes(colour: Linear) -> [u8; 3] {
         (0..=STEPS as u16).map(byte).collect()
     });
     let bytes: &[u8] = &BYTES;
-    // Casts of what is below 0 or no number are 0.
-    let byte = |c: f32| bytes[((c * STEPS + 0.5) as usize).min(STEPS as usize)];
+    // Casts of what is no number are 0; those to signed numbers are the quickest.
+    let byte = |c: f32| bytes[((c * STEPS + 0.5) as i32).clamp(0, STEPS as i32) as usize];
     [byte(colour[0]), byte(colour[1]), byte(colour[2])]
 }
 

@@ -51,11 +51,10 @@ impl Range {
         let [a, b, c] = values;
         let value = spot.weights[0] * a + spot.weights[1] * b + spot.weights[2] * c;
         let x = (value - self.middle) / self.reach;
-        // Casts of what is no number are 0, and those of what is too small are, too.
-        let at = ((x + 1.0) * (0.5 * (COLOURS - 1) as f64) + 0.5) as usize;
+        let at = ((x + 1.0) * (0.5 * (COLOURS - 1) as f64) + 0.5) as i32;
         match x.is_nan() {
             true => SCALE[COLOURS / 2],
-            false => SCALE[at.min(COLOURS - 1)],
+            false => SCALE[at.clamp(0, COLOURS as i32 - 1) as usize],
         }
     }
 
