@@ -358,6 +358,7 @@ pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// Euclidean length, without overflow or underflow of squares.
+#[inline]
 pub fn norm(d: [f64; 3]) -> f64 {
     let square = dot(d, d);
     match PLAIN_SQUARES.contains(&square) {
@@ -371,6 +372,7 @@ pub fn norm(d: [f64; 3]) -> f64 {
 pub(crate) const PLAIN_SQUARES: std::ops::Range<f64> = 1e-200..1e200;
 
 /// Cross product.
+#[inline]
 pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [
         a[1] * b[2] - a[2] * b[1],
@@ -380,13 +382,15 @@ pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 /// Scalar product.
+#[inline]
 pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Difference `a − b`.
+#[inline]
 pub fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| a[i] - b[i])
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// Distance of a point from a segment, in any dimension.

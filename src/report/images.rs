@@ -6,10 +6,12 @@ use crate::geometry::mesh::{bounding_box, distance};
 use crate::product::{MeanMax, Quality};
 use crate::rebuild::{Images, rebuild};
 
-/// Samples on each side for each face of the source, and the range that they are held to. The RMS of the most is off by a few per cent at
-/// most (0.2 dB); more would cost more than they tell.
+/// Samples on each side for each face of the source, and the range that they are held to. On six models the PSNR is then within 1.1 dB of what
+/// 400,000 samples give, on five of them within 0.7 dB; where the error sits in few places it is off by more than where it is spread.
 const SAMPLES_OF_FACE: usize = 4;
-const SAMPLES: [usize; 2] = [4_000, 20_000];
+const SAMPLES: [usize; 2] = [4_000, 10_000];
+/// Samples for each vertex that is tested: these matter for the largest distance only.
+const SAMPLES_OF_VERTEX: usize = 4;
 
 /// Images of so many texels are measured whatever was asked for, …
 const MEASURED_TEXELS: usize = 4_500_000;
@@ -58,7 +60,7 @@ pub fn measure_images(
     let samples = (SAMPLES_OF_FACE * source.faces.len()).clamp(SAMPLES[0], SAMPLES[1]);
     let sampling = Sampling {
         samples,
-        vertices: samples,
+        vertices: samples / SAMPLES_OF_VERTEX,
     };
     let found = deviation_and_distances(source, rebuilt, sampling, points);
     let Some((found, distances)) = found else {

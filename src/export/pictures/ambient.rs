@@ -16,6 +16,9 @@ const REACH: f64 = 0.11;
 /// How strongly they darken.
 const STRENGTH: f64 = 2.6;
 
+/// Texels whose openness differs by less are not told apart.
+const ALIKE: f32 = 0.012;
+
 /// A point of the surface with its unit normal.
 pub type Point = (Vec3, Vec3);
 
@@ -24,6 +27,7 @@ pub type Point = (Vec3, Vec3);
 pub struct Ambient {
     side: usize,
     points: Vec<Option<Point>>,
+    /// Not a number where nothing is seen.
     open: Vec<f32>,
     reach: f64,
 }
@@ -50,38 +54,72 @@ impl Ambient {
 
     fn openness(&self, at: usize, spiral: &[[f64; 2]]) -> f32 {
         let Some((p, n)) = self.points[at] else {
-            return 1.0;
+            return f32::NAN;
         };
         let (x, y) = ((at % self.side) as f64 + 0.5, (at / self.side) as f64 + 0.5);
         let hidden = |[dx, dy]: &[f64; 2]| {
             let (q, _) = self.point((x + dx) as i64, (y + dy) as i64)?;
             let away = sub(q, p);
-            let fade = 1.0 - dot(away, away) / (self.reach * self.reach);
             let above = dot(away, n) - 0.01 * self.reach;
-            (fade > 0.0 && above > 0.0).then(|| fade * above / dot(away, away).sqrt())
+            if above <= 0.0 {
+                return None;
+            }
+            let away = dot(away, away);
+            let fade = 1.0 - away / (self.reach * self.reach);
+            (fade > 0.0).then(|| fade * above / away.sqrt())
         };
         let sum: f64 = spiral.iter().filter_map(hidden).sum();
         (1.0 - STRENGTH * sum / NEARBY as f64).max(0.0) as f32
     }
 
-    fn point(&self, column: i64, row: i64) -> Option<Point> {
+    /// Number of a texel that the picture has.
+    fn texel(&self, column: i64, row: i64) -> Option<usize> {
         let side = 0..self.side as i64;
         let inside = side.contains(&column) && side.contains(&row);
-        inside.then(|| self.points[row as usize * self.side + column as usize])?
+        inside.then(|| row as usize * self.side + column as usize)
     }
 
-    /// How open a point is that is seen at a place of the picture: the mean of what is near it there and on its tangent plane.
-    pub fn at(&self, place: [f64; 2], (p, n): Point) -> f32 {
-        let [x, y] = place.map(|x| x / COARSER as f64 - 0.5);
-        let (column, row) = (x.floor(), y.floor());
+    fn point(&self, column: i64, row: i64) -> Option<Point> {
+        self.points[self.texel(column, row)?]
+    }
+
+    /// How open a point is that is seen at a place of the picture: the mean of what is near it there and on its tangent plane. `point` is
+    /// asked for only where what is near is not alike.
+    pub fn at(&self, place: [f64; 2], point: impl FnOnce() -> Point) -> f32 {
+        let (x, y) = (
+            place[0] / COARSER as f64 + 0.5,
+            place[1] / COARSER as f64 + 0.5,
+        );
+        // Truncated, which is quicker than rounded down: places are not negative. Of the texels around, this is the last one.
+        let (column, row) = (x as usize, y as usize);
+        let (fx, fy) = (x - column as f64, y - row as f64);
+        let weight = [
+            (1.0 - fx) * (1.0 - fy),
+            fx * (1.0 - fy),
+            (1.0 - fx) * fy,
+            fx * fy,
+        ];
+        if (1..self.side).contains(&column) && (1..self.side).contains(&row) {
+            let last = row * self.side + column;
+            let first = last - self.side - 1;
+            let open = &self.open;
+            let [a, b, c, d] = [open[first], open[first + 1], open[last - 1], open[last]];
+            // False where one is not a number.
+            if (b - a).abs() < ALIKE && (c - a).abs() < ALIKE && (d - a).abs() < ALIKE {
+                let [_, of_b, of_c, of_d] = weight;
+                let mean = of_b * f64::from(b - a) + of_c * f64::from(c - a);
+                return (f64::from(a) + mean + of_d * f64::from(d - a)) as f32;
+            }
+        }
+        let (p, n) = point();
         let (mut sum, mut whole) = (0.0, 0.0);
-        for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-            let (c, r) = (column + dx, row + dy);
-            if let Some((q, m)) = self.point(c as i64, r as i64) {
+        for (k, share) in weight.into_iter().enumerate() {
+            let at = self.texel((column + k % 2) as i64 - 1, (row + k / 2) as i64 - 1);
+            if let Some((at, (q, m))) = at.and_then(|at| Some((at, self.points[at]?))) {
                 let off = dot(sub(q, p), n).abs() / (0.1 * self.reach);
                 let alike = (1.0 - off).max(0.0) * dot(m, n).max(0.0) + 1e-4;
-                let weight = (1.0 - (x - c).abs()) * (1.0 - (y - r).abs()) * alike;
-                sum += weight * f64::from(self.open[r as usize * self.side + c as usize]);
+                let weight = share * alike;
+                sum += weight * f64::from(self.open[at]);
                 whole += weight;
             }
         }
@@ -109,7 +147,7 @@ mod tests {
         let ambient = Ambient::new(points.clone(), 64, 64.0);
         let open = |column: usize| {
             let place = [column, 30].map(|x| (COARSER * x) as f64 + 0.5 * COARSER as f64);
-            points[30 * 64 + column].map(|point| ambient.at(place, point))
+            points[30 * 64 + column].map(|point| ambient.at(place, || point))
         };
         assert_eq!([open(10), open(50)], [Some(1.0); 2]);
         assert!(

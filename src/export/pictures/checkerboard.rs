@@ -1,9 +1,9 @@
 //! A checkerboard in flat coordinates that stays readable whatever the scale. On a grid it is that of `TEXCOORD_0`, whose squares are cells.
 
+use super::brush::Spot;
 use super::colour::{Linear, mix};
-use super::studio::Spot;
 use crate::atlas::plane::{doubled_area, rotate};
-use crate::geometry::ids::FaceId;
+use crate::geometry::ids::{FaceId, VertexId};
 use crate::geometry::mesh::triangle_area;
 use crate::geometry::triangle::area;
 use crate::product::AffineAtlas;
@@ -64,32 +64,41 @@ impl Checkerboard<'_> {
         }
     }
 
-    /// Colour of a spot of the surface, averaged over about a pixel.
-    pub fn colour(&self, spot: &Spot) -> Linear {
+    /// What the board is on a face.
+    pub fn of_face(&self, face: usize) -> FaceBoard {
+        let f = FaceId::new(face);
+        let [a, b, c] = self.atlas.mesh.connectivity.face_vertices(f);
+        let level = |v: VertexId| self.level[v.index()];
+        let mut board = FaceBoard {
+            face: f,
+            level: [level(a), level(b), level(c)],
+            step: 0.0,
+            per_cell: 0.0,
+            at: [[0.0; 3]; 2],
+            ends: [[0.0; 2]; 2],
+        };
+        board.lay(self, 0.0);
+        board
+    }
+
+    /// Colour of a spot of the surface, averaged over about a pixel; `board` is that of its face.
+    pub fn colour(&self, board: &mut FaceBoard, spot: &Spot) -> Linear {
         const LIGHT: Linear = [0.84, 0.80, 0.71];
         const DARK: Linear = [0.070, 0.205, 0.270];
-        let f = FaceId::new(spot.face);
-        let corners = self.atlas.mesh.connectivity.face_vertices(f);
-        let level = |k: usize| spot.weights[k] * self.level[corners[k].index()];
-        let excess = excess(level(0) + level(1) + level(2));
-        let step = excess.floor();
+        let (weights, level) = (&spot.weights, &board.level);
+        let excess = excess(weights[0] * level[0] + weights[1] * level[1] + weights[2] * level[2]);
+        let step = floor(excess);
+        if step != board.step {
+            board.lay(self, step);
+        }
+        let [x, y] = [board.span(spot, 0), board.span(spot, 1)];
+        let coarse = dark_share([x, y], board.per_cell);
         let fade = (((excess - step) - 0.47) / 0.06).clamp(0.0, 1.0);
-        let cell = self.cell(step);
-        let corners = self.corners(f, cell);
-        let [from_1, from_2] = [1, 2].map(|k| [0, 1].map(|i| corners[k][i] - corners[0][i]));
-        let along = |w: &[f64; 3], i: usize| w[1] * from_1[i] + w[2] * from_2[i];
-        let at = [0, 1].map(|i| corners[0][i] + along(&spot.weights, i));
-        // Not beyond the face: cells need not alternate where an island ends.
-        let spans = [0, 1].map(|i| {
-            let half = 0.5 * (along(&spot.right, i).abs() + along(&spot.down, i).abs());
-            let [a, b, c] = corners.map(|p| p[i]);
-            [
-                (at[i] - half).max(a.min(b).min(c)),
-                (at[i] + half).min(a.max(b).max(c)),
-            ]
-        });
-        let [coarse, fine] = [cell, 0.5 * cell].map(|cell| dark_share(spans, cell));
-        mix(LIGHT, DARK, (coarse + fade * (fine - coarse)) as f32)
+        let dark = match fade > 0.0 {
+            true => coarse + fade * (dark_share([x, y], 2.0 * board.per_cell) - coarse),
+            false => coarse,
+        };
+        mix(LIGHT, DARK, dark as f32)
     }
 
     /// log₂ of a cell's side in space at each vertex, relative to the middle.
@@ -124,6 +133,50 @@ impl Checkerboard<'_> {
     }
 }
 
+/// The board on one face, with cells of one size.
+#[derive(Clone, Copy, Debug)]
+pub struct FaceBoard {
+    face: FaceId,
+    /// log₂ of a cell's side at its corners.
+    level: [f64; 3],
+    /// Into how many powers of two times smaller cells these are cut.
+    step: f64,
+    /// Cells a flat unit.
+    per_cell: f64,
+    /// Of each coordinate: that of the first corner, and from there to the other two.
+    at: [[f64; 3]; 2],
+    /// Of each coordinate: the least and the greatest of a corner.
+    ends: [[f64; 2]; 2],
+}
+
+impl FaceBoard {
+    /// Lays cells of another size.
+    fn lay(&mut self, board: &Checkerboard, step: f64) {
+        let cell = board.cell(step);
+        let [a, b, c] = board.corners(self.face, cell);
+        for i in 0..2 {
+            self.at[i] = [a[i], b[i] - a[i], c[i] - a[i]];
+            self.ends[i] = [a[i].min(b[i]).min(c[i]), a[i].max(b[i]).max(c[i])];
+        }
+        (self.step, self.per_cell) = (step, 1.0 / cell);
+    }
+
+    /// What a pixel around a spot covers of a coordinate; not beyond the face, for cells need not alternate where an island ends.
+    fn span(&self, spot: &Spot, i: usize) -> [f64; 2] {
+        let ([first, to_b, to_c], [low, high]) = (self.at[i], self.ends[i]);
+        let along = |w: &[f64; 3]| w[1] * to_b + w[2] * to_c;
+        let at = first + along(&spot.weights);
+        let half = 0.5 * (along(&spot.right).abs() + along(&spot.down).abs());
+        [(at - half).max(low), (at + half).min(high)]
+    }
+}
+
+/// Rounds down. A cast, since the library's function is a call on older processors.
+fn floor(x: f64) -> f64 {
+    let whole = x as i64 as f64;
+    if whole > x { whole - 1.0 } else { whole }
+}
+
 /// By how many powers of two cells at this level are too large (positive) or too small: those are cut, these joined.
 pub fn excess(level: f64) -> f64 {
     level - level.clamp(CELL_RANGE[0], CELL_RANGE[1])
@@ -150,15 +203,21 @@ pub fn weighted_quantile(values: &[(f64, f64)], share: f64) -> f64 {
     found.or(values.last()).map_or(0.0, |v| v.0)
 }
 
-/// Share of dark cells between these ends along both axes; half where there is no board.
-fn dark_share(spans: [[f64; 2]; 2], cell: f64) -> f64 {
+/// Share of dark cells between these ends along both axes, of so many cells a unit; half where there is no board.
+fn dark_share([x, y]: [[f64; 2]; 2], per_cell: f64) -> f64 {
     // Along each axis the mean of a wave of −1 and 1, from its integral; their product is the board.
-    let [x, y] = spans.map(|[low, high]| {
-        let (low, width) = (low / cell, ((high - low) / cell).max(1e-6));
-        let integral = |x: f64| (0.5 * x - (0.5 * x).floor() - 0.5).abs();
-        2.0 * (integral(low) - integral(low + width)) / width
-    });
-    let dark = 0.5 - 0.5 * x * y;
+    let in_cells = |[low, high]: [f64; 2]| (low * per_cell, ((high - low) * per_cell).max(1e-6));
+    let ((left, wide), (bottom, high)) = (in_cells(x), in_cells(y));
+    let (column, row) = (floor(left), floor(bottom));
+    // Mostly there is one cell.
+    if left + wide < column + 1.0 && bottom + high < row + 1.0 {
+        let half = 0.5 * (column + row);
+        return 2.0 * (half - floor(half));
+    }
+    let integral = |x: f64| (0.5 * x - floor(0.5 * x) - 0.5).abs();
+    let of_x = integral(left) - integral(left + wide);
+    let of_y = integral(bottom) - integral(bottom + high);
+    let dark = 0.5 - 2.0 * of_x * of_y / (wide * high);
     if dark.is_finite() { dark } else { 0.5 }
 }
 

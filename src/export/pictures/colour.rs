@@ -31,7 +31,12 @@ pub fn to_linear(colour: [u8; 3]) -> Linear {
         })
     });
     let light: &[f32; 256] = &LIGHT;
-    colour.map(|c| light[usize::from(c)])
+    let [r, g, b] = colour;
+    [
+        light[usize::from(r)],
+        light[usize::from(g)],
+        light[usize::from(b)],
+    ]
 }
 
 /// Linear light to sRGB bytes; anything outside 0 to 1 is clamped, NaN is black.
@@ -51,12 +56,16 @@ pub fn to_bytes(colour: Linear) -> [u8; 3] {
         (0..=STEPS as u16).map(byte).collect()
     });
     let bytes: &[u8] = &BYTES;
-    colour.map(|c| bytes[(c * STEPS + 0.5).clamp(0.0, STEPS) as usize])
+    // Casts of what is no number are 0; those to signed numbers are the quickest.
+    let byte = |c: f32| bytes[((c * STEPS + 0.5) as i32).clamp(0, STEPS as i32) as usize];
+    [byte(colour[0]), byte(colour[1]), byte(colour[2])]
 }
 
 /// a + t (b − a), component by component.
+#[inline]
 pub fn mix(a: Linear, b: Linear, t: f32) -> Linear {
-    std::array::from_fn(|i| a[i] + t * (b[i] - a[i]))
+    let mix = |i: usize| a[i] + t * (b[i] - a[i]);
+    [mix(0), mix(1), mix(2)]
 }
 
 /// Well distinguishable pale colours for any number of things: hues a golden angle apart, three lightnesses.

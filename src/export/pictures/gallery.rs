@@ -1,10 +1,9 @@
 //! Several metrics on one surface, side by side from the same views in the same colours.
 
 use super::colour::{INK, PAPER};
-use super::scale::Range;
-use super::studio::{Mark, Spot, Studio};
+use super::scale::{Coloured, Range};
+use super::studio::{Mark, Studio};
 use super::text::{self, LINE};
-use super::view::choose_direction;
 use crate::geometry::mesh::Mesh;
 use image::{Rgb, RgbImage, imageops};
 use std::f64::consts::FRAC_PI_2;
@@ -40,18 +39,9 @@ pub struct Gallery<'a> {
 impl<'a> Gallery<'a> {
     /// Sets up panels of `size` × `size` pixels, held to the range of sizes.
     pub fn new(mesh: &'a Mesh, size: usize) -> Gallery<'a> {
-        let (positions, faces) = (mesh.positions.as_slice(), mesh.connectivity.to_faces());
-        let front = choose_direction(positions, &faces);
-        let studio = |from| Studio::new(mesh, size, from);
-        let mut studios = vec![studio(front)];
-        if mesh.connectivity.is_closed() {
-            // Half around the vertical.
-            let [x, y, z] = front;
-            studios.push(studio([-x, y, -z]));
-        }
         Gallery {
             side: super::canvas::side(size),
-            studios,
+            studios: Studio::views(mesh, size, mesh.connectivity.is_closed()),
             mesh,
         }
     }
@@ -81,10 +71,14 @@ impl<'a> Gallery<'a> {
         let mut image = RgbImage::from_pixel(width as u32, height as u32, Rgb(PAPER));
         for (k, (panel, range)) in panels.iter().zip(ranges).enumerate() {
             let range = Range { reach, ..range };
-            let paint = |spot: &Spot| range.colour(mesh, panel.log_scale, spot);
+            let paint = Coloured {
+                range,
+                mesh,
+                values: panel.log_scale,
+            };
             let (left, marks) = (k * side, marks(panel));
             for (row, studio) in self.studios.iter().enumerate() {
-                let [drawn] = studio.draw(&marks, [&paint]);
+                let [drawn] = studio.draw(&marks, &paint);
                 let top = head + row * side;
                 imageops::replace(&mut image, &drawn, left as i64, top as i64);
             }

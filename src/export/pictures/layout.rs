@@ -46,8 +46,7 @@ pub fn layout(atlas: &AffineAtlas, size: usize) -> RgbImage {
     image
 }
 
-/// Faces in the colours of their patches multiplied with what lies beneath, so that overlaps darken, and the lines between patches, the
-/// boundary and the cut.
+/// Faces in the colours of their patches, and the lines between patches, the boundary and the cut.
 fn faces(
     canvas: &mut Canvas,
     atlas: &AffineAtlas,
@@ -59,29 +58,29 @@ fn faces(
     let patch = &atlas.patches.face_patch;
     for f in connectivity.faces() {
         let colour = categorical(patch[f].index());
-        canvas.triangle(uv[f].map(|p| place(f, p)), |below| match below {
-            PAPER => colour,
-            _ => std::array::from_fn(|i| {
-                let product = u32::from(below[i]) * u32::from(colour[i]) / u32::from(PAPER[i]);
-                product.min(255) as u8
-            }),
-        });
+        canvas.triangle(uv[f].map(|p| place(f, p)), colour);
     }
     // Between patches, the boundary and the cut: the thickest last.
     let styles = [(0.0014, [120; 3]), (0.0022, INK), (0.0024, CUT)];
-    for (kind, (width, colour)) in styles.into_iter().enumerate() {
-        for h in connectivity.halfedges() {
-            let (f, k) = (connectivity.face(h), connectivity.corner(h));
-            let across = connectivity.twin(h).map(|t| patch[connectivity.face(t)]);
-            let is_it = match atlas.cut.segment[connectivity.edge(h)] {
-                NONE => across.map_or(kind == 1, |g| kind == 0 && g != patch[f]),
-                _ => kind == 2,
-            };
-            if is_it {
-                let [a, b] = [uv[f][k], uv[f][(k + 1) % 3]].map(|p| place(f, p));
-                canvas.line(a, b, width * full, colour);
-            }
-        }
+    let mut lines = Vec::new();
+    for h in connectivity.halfedges() {
+        let f = connectivity.face(h);
+        let across = connectivity.twin(h).map(|t| patch[connectivity.face(t)]);
+        let kind = match (atlas.cut.segment[connectivity.edge(h)], across) {
+            (NONE, Some(g)) if g == patch[f] => continue,
+            (NONE, Some(_)) => 0,
+            (NONE, None) => 1,
+            _ => 2,
+        };
+        lines.push((kind, h));
+    }
+    // Stable.
+    lines.sort_by_key(|(kind, _)| *kind);
+    for (kind, h) in lines {
+        let ((width, colour), f): ((f64, _), _) = (styles[kind], connectivity.face(h));
+        let k = connectivity.corner(h);
+        let [a, b] = [uv[f][k], uv[f][(k + 1) % 3]].map(|p| place(f, p));
+        canvas.line(a, b, width * full, colour);
     }
 }
 

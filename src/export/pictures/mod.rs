@@ -9,11 +9,13 @@
 //! * [`Gallery`]: log scales of several metrics on one surface, side by side.
 //! * [`encode_png`]: an image as the bytes of a PNG file.
 //!
-//! `view` looks for a direction that shows much of the surface, `raster` finds what each sample of each pixel sees, and `studio` lights it.
+//! `view` looks for a direction that shows much of the surface (of a coarse `proxy`), `raster` finds what each sample of each pixel sees, `studio`
+//! paints it, and `light` and `ambient` light it.
 //!
 //! Not guaranteed: equal bytes on different platforms (sines and powers differ in the last bit).
 
 mod ambient;
+mod brush;
 mod canvas;
 pub(crate) mod checkerboard;
 pub(crate) mod colour;
@@ -21,6 +23,9 @@ pub(crate) mod convergence;
 mod floor;
 mod gallery;
 mod layout;
+mod light;
+mod normals;
+mod proxy;
 mod raster;
 pub(crate) mod scale;
 mod studio;

@@ -3,6 +3,7 @@
 //! A pixel has [`SAMPLES`] samples, one in each of as many rows, at staggered columns, so that nearly upright and nearly level edges get as
 //! many shades as there are samples. Rows are rows of samples, columns are columns of pixels.
 
+use crate::geometry::mesh::sub;
 use std::ops::Range;
 
 /// Samples of a pixel.
@@ -18,18 +19,26 @@ pub fn place(column: usize, row: usize) -> [f64; 2] {
     [column as f64 + COLUMNS[row % SAMPLES], y]
 }
 
-/// Rounds up; below 0 it is 0. A cast, since the library's function is a call on older processors.
+/// A point of the screen for a picture of one sample a pixel, whose rows of samples are rows of pixels.
+pub fn sparse([x, y, near]: [f64; 3]) -> [f64; 3] {
+    [x, y / SAMPLES as f64, near]
+}
+
+/// Rounds up; below 0 it is 0. A cast, since the library's function is a call on older processors, and to a signed number, which is quicker.
+#[inline]
 fn up(x: f64) -> usize {
-    let whole = x as usize;
-    whole.saturating_add(usize::from((whole as f64) < x))
+    let whole = x as i32;
+    whole.max(0) as usize + usize::from(f64::from(whole) < x)
 }
 
 /// The first row of samples at or below a height in pixels.
-fn row_at(y: f64) -> usize {
+#[inline]
+pub fn row_at(y: f64) -> usize {
     up(y * SAMPLES as f64 - 0.5)
 }
 
 /// The columns of a row whose samples lie from `low` up to `high`.
+#[inline]
 fn columns(row: usize, low: f64, high: f64, width: usize) -> Range<usize> {
     let shift = COLUMNS[row % SAMPLES];
     up(low - shift)..up(high - shift).min(width)
@@ -47,25 +56,63 @@ pub fn covered(
         return;
     }
     // From top to bottom, so that an edge has the same numbers in both of its triangles.
-    let mut sorted = corners;
-    sorted.sort_unstable_by(|p, q| p[1].total_cmp(&q[1]));
-    let [a, b, c] = sorted;
-    let middle = row_at(b[1]);
-    for row in row_at(a[1]).max(rows.start)..row_at(c[1]).min(rows.end) {
+    let [mut a, mut b, mut c] = corners;
+    if b[1] < a[1] {
+        std::mem::swap(&mut a, &mut b);
+    }
+    if c[1] < b[1] {
+        std::mem::swap(&mut b, &mut c);
+        if b[1] < a[1] {
+            std::mem::swap(&mut a, &mut b);
+        }
+    }
+    let (first, middle) = (row_at(a[1]).max(rows.start), row_at(b[1]));
+    let end = row_at(c[1]).min(rows.end);
+    if first >= end {
+        return;
+    }
+    let (long, upper, lower) = (Side::new(a, c), Side::new(a, b), Side::new(b, c));
+    for row in first..end {
         let y = (row as f64 + 0.5) / SAMPLES as f64;
-        let crossing = |p: [f64; 2], q: [f64; 2]| {
-            p[0] + (q[0] - p[0]) * ((y - p[1]) / (q[1] - p[1])).clamp(0.0, 1.0)
-        };
-        let long = crossing(a, c);
-        let short = if row < middle {
-            crossing(a, b)
-        } else {
-            crossing(b, c)
-        };
+        let (long, short) = (
+            long.crossing(y),
+            match row < middle {
+                true => upper.crossing(y),
+                false => lower.crossing(y),
+            },
+        );
         let columns = columns(row, long.min(short), long.max(short), width);
         if !columns.is_empty() {
             visit(row, columns);
         }
+    }
+}
+
+/// A side of a triangle from its upper end to its lower one.
+struct Side {
+    from: [f64; 2],
+    /// Columns a row.
+    slope: f64,
+    /// What its columns are held to.
+    low: f64,
+    high: f64,
+}
+
+impl Side {
+    fn new(p: [f64; 2], q: [f64; 2]) -> Side {
+        Side {
+            from: p,
+            slope: (q[0] - p[0]) / (q[1] - p[1]),
+            low: p[0].min(q[0]),
+            high: p[0].max(q[0]),
+        }
+    }
+
+    /// Its column at a height.
+    #[inline]
+    fn crossing(&self, y: f64) -> f64 {
+        let x = self.from[0] + self.slope * (y - self.from[1]);
+        x.max(self.low).min(self.high)
     }
 }
 
@@ -116,17 +163,21 @@ pub struct Band {
     width: usize,
     /// First row.
     top: usize,
-    /// Objects and their closeness.
-    samples: Vec<(u32, f32)>,
+    /// The nearest objects, row by row, …
+    objects: Vec<u32>,
+    /// … and their closeness.
+    near: Vec<f32>,
 }
 
 impl Band {
     /// Nothing drawn yet.
     pub fn new(width: usize, rows: Range<usize>) -> Band {
+        let count = width * rows.len();
         Band {
             width,
             top: rows.start,
-            samples: vec![(NOTHING, f32::NEG_INFINITY); width * rows.len()],
+            objects: vec![NOTHING; count],
+            near: vec![f32::NEG_INFINITY; count],
         }
     }
 
@@ -141,7 +192,7 @@ impl Band {
 
     /// Its rows.
     fn rows(&self) -> Range<usize> {
-        self.top..self.top + self.samples.len() / self.width.max(1)
+        self.top..self.top + self.objects.len() / self.width.max(1)
     }
 
     /// Draws a triangle of column, row (in pixels) and closeness. Closeness must be linear on the screen: 1 / depth under perspective, −depth
@@ -149,7 +200,7 @@ impl Band {
     pub fn draw(&mut self, triangle: &[[f64; 3]; 3], object: u32) {
         let (width, top, rows) = (self.width, self.top, self.rows());
         let [a, b, c] = triangle;
-        let [ab, ac] = [b, c].map(|p| [0, 1, 2].map(|i| p[i] - a[i]));
+        let (ab, ac) = (sub(*b, *a), sub(*c, *a));
         let area = ab[0] * ac[1] - ab[1] * ac[0];
         let slope = [
             (ab[2] * ac[1] - ac[2] * ab[1]) / area,
@@ -157,20 +208,23 @@ impl Band {
         ];
         // Triangles seen edge-on have no slope.
         let (low, high) = (a[2].min(b[2]).min(c[2]), a[2].max(b[2]).max(c[2]));
+        let (step, low_end, high_end) = (slope[0] as f32, low as f32, high as f32);
         covered(
-            triangle.map(|p| [p[0], p[1]]),
+            [[a[0], a[1]], [b[0], b[1]], [c[0], c[1]]],
             width,
             rows,
             |row, columns| {
                 let [x, y] = place(columns.start, row);
                 let first = a[2] + slope[0] * (x - a[0]) + slope[1] * (y - a[1]);
+                let first = first.max(low).min(high) as f32;
                 let at = (row - top) * width;
-                let samples = &mut self.samples[at + columns.start..at + columns.end];
-                for (k, sample) in samples.iter_mut().enumerate() {
-                    let near = (first + slope[0] * k as f64).max(low).min(high) as f32;
-                    if near > sample.1 {
-                        *sample = (object, near);
-                    }
+                let span = at + columns.start..at + columns.end;
+                let samples = self.near[span.clone()].iter_mut();
+                for (k, (near, seen)) in (0_u16..).zip(samples.zip(&mut self.objects[span])) {
+                    let new = (first + step * f32::from(k)).max(low_end).min(high_end);
+                    let is_nearer = new > *near;
+                    *seen = if is_nearer { object } else { *seen };
+                    *near = if is_nearer { new } else { *near };
                 }
             },
         );
@@ -184,16 +238,22 @@ impl Band {
         stroked(axis, radius, width, rows, |column, row, t, d2| {
             let near = a[2] + t * (b[2] - a[2]);
             let near = near * (1.0 + bulge * (radius * radius - d2).max(0.0).sqrt());
-            let sample = &mut self.samples[(row - top) * width + column];
-            if near as f32 > sample.1 {
-                *sample = (object, near as f32);
+            let at = (row - top) * width + column;
+            if near as f32 > self.near[at] {
+                (self.objects[at], self.near[at]) = (object, near as f32);
             }
         });
     }
 
-    /// What is seen at a sample, [`NOTHING`] where nothing is, and its closeness.
+    /// What is seen at each sample, row by row; [`NOTHING`] where nothing is.
+    pub fn objects(&self) -> &[u32] {
+        &self.objects
+    }
+
+    /// What is seen at a sample, and its closeness.
     pub fn seen(&self, column: usize, row: usize) -> (u32, f32) {
-        self.samples[(row - self.top) * self.width + column]
+        let at = (row - self.top) * self.width + column;
+        (self.objects[at], self.near[at])
     }
 }
 

@@ -1,12 +1,21 @@
 //! Colours for the log scale: blue where the flat metric shrinks the surface, red where it grows.
 
+use super::brush::{Paint, Spot};
 use super::checkerboard::{ascending, weighted_quantile};
 use super::colour::{INK, Linear, diverging, to_linear};
-use super::studio::Spot;
 use super::text;
 use crate::geometry::ids::FaceId;
 use crate::geometry::mesh::{Mesh, triangle_area};
 use image::{Rgb, RgbImage};
+use std::sync::LazyLock;
+
+/// Colours of the scale that are told apart; an odd number, for a middle.
+const COLOURS: usize = 2047;
+/// They, from one end to the other.
+static SCALE: LazyLock<Vec<Linear>> = LazyLock::new(|| {
+    let at = |k: usize| 2.0 * k as f64 / (COLOURS - 1) as f64 - 1.0;
+    (0..COLOURS).map(|k| to_linear(diverging(at(k)))).collect()
+});
 
 /// Which values get which colours.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,15 +46,16 @@ impl Range {
         Range { middle, reach }
     }
 
-    /// Colour of a spot of the surface by the values at the vertices of its face.
-    pub(super) fn colour(self, mesh: &Mesh, values: &[f64], spot: &Spot) -> Linear {
-        let corners = mesh.connectivity.face_vertices(FaceId::new(spot.face));
-        let value = |k: usize| {
-            let value = values.get(corners[k].index()).copied();
-            spot.weights[k] * value.unwrap_or(f64::NAN)
-        };
-        let value = value(0) + value(1) + value(2);
-        to_linear(diverging((value - self.middle) / self.reach))
+    /// Colour of a spot of the surface by the values at the corners of its face.
+    fn colour(self, values: &[f64; 3], spot: &Spot) -> Linear {
+        let [a, b, c] = values;
+        let value = spot.weights[0] * a + spot.weights[1] * b + spot.weights[2] * c;
+        let x = (value - self.middle) / self.reach;
+        let at = ((x + 1.0) * (0.5 * (COLOURS - 1) as f64) + 0.5) as i32;
+        match x.is_nan() {
+            true => SCALE[COLOURS / 2],
+            false => SCALE[at.clamp(0, COLOURS as i32 - 1) as usize],
+        }
     }
 
     /// A vertical bar of colours with numbers, at the right; left out of small pictures.
@@ -71,5 +81,26 @@ impl Range {
         }
         let at = [right as f64 - 12.0, top as f64 - 18.0];
         text::write(image, title, at, 1.0, INK);
+    }
+}
+
+/// A surface in the colours of values at its vertices.
+pub(super) struct Coloured<'a> {
+    pub range: Range,
+    pub mesh: &'a Mesh,
+    /// Those that are missing have no colour.
+    pub values: &'a [f64],
+}
+
+impl Paint<1> for Coloured<'_> {
+    type OfFace = [f64; 3];
+
+    fn of_face(&self, face: usize) -> [f64; 3] {
+        let corners = self.mesh.connectivity.face_vertices(FaceId::new(face));
+        corners.map(|v| self.values.get(v.index()).copied().unwrap_or(f64::NAN))
+    }
+
+    fn colours(&self, values: &mut [f64; 3], spot: &Spot) -> [Linear; 1] {
+        [self.range.colour(values, spot)]
     }
 }

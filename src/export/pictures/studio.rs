@@ -3,52 +3,36 @@
 //! *Enters:* a mesh, a size, marks and what the surface looks like without light. *Leaves:* pictures. The view and the light depend
 //! on the mesh only, so pictures of different metrics on one mesh can be laid side by side.
 //!
-//! What the samples of each pixel see is found first; each object is then shaded once a pixel, at the middle of its samples. Light comes from
-//! the sky and the ground, a lamp and a fill light; nearby parts of the surface take some of it ([`Ambient`]).
+//! What the samples of each pixel see is found first; each object is then shaded once a pixel, at the middle of its samples, by a [`Brush`].
+//! Nearby parts of the surface take some of its light ([`Ambient`]).
 
-use super::ambient::{Ambient, COARSER, Point};
-use super::colour::{CUT, Linear, NEGATIVE, POSITIVE, mix, to_bytes, to_linear};
+use super::ambient::{Ambient, COARSER};
+use super::brush::{Aspect, Brush, Paint, Spot};
+use super::colour::{CUT, Linear, NEGATIVE, POSITIVE, to_linear};
 use super::floor::Floor;
-use super::raster::{Band, NOTHING, SAMPLES, place};
-use super::view::{Camera, Vec3, along, is_behind, unit};
-use crate::geometry::ids::FaceId;
-use crate::geometry::mesh::{Mesh, cross, dot, norm, sub};
-use image::{Rgb, RgbImage};
+use super::light::Light;
+use super::normals::corner_normals;
+use super::proxy::Proxy;
+use super::raster::{Band, NOTHING, SAMPLES, place, row_at, sparse};
+use super::view::{Camera, Vec3, along, choose_direction};
+use crate::geometry::mesh::{Mesh, dot, sub};
+use image::RgbImage;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Rows of pixels that are drawn at a time.
 const BAND: usize = 32;
-/// Faces that meet at less than this share a smooth normal: cosine of 40°.
-const CREASE: f64 = 0.766;
 /// Radius of a bar along the cut, in sides of the picture.
 const CUT_RADIUS: f64 = 0.0026;
 /// Radius of the ball at a cone, likewise.
 const CONE_RADIUS: f64 = 0.0125;
-
-/// Tint of the back of the surface.
-const INSIDE: Linear = [0.55, 0.40, 0.30];
-
-/// A point of the surface that a pixel shows.
-pub struct Spot {
-    /// Its face.
-    pub face: usize,
-    /// Its barycentric weights.
-    pub weights: [f64; 3],
-    /// By how much these change to the next pixel to the right, …
-    pub right: [f64; 3],
-    /// … and to the one below.
-    pub down: [f64; 3],
-}
-
-/// What a spot looks like without light.
-pub(super) type Paint<'a> = dyn Fn(&Spot) -> Linear + Sync + 'a;
 
 /// A ball or a bar with round ends, by the ends of its axis.
 pub(super) struct Mark {
     ends: [Vec3; 2],
     /// In sides of the picture.
     radius: f64,
-    colour: Linear,
+    pub colour: Linear,
 }
 
 impl Mark {
@@ -77,36 +61,47 @@ impl Mark {
 pub(super) struct Studio {
     camera: Camera,
     positions: Vec<Vec3>,
-    faces: Vec<[u32; 3]>,
+    pub faces: Vec<[u32; 3]>,
     /// Vertices on the screen.
     screen: Vec<Vec3>,
     /// Unit normals of the corners of faces.
     normals: Vec<[Vec3; 3]>,
-    floor: Floor,
-    ambient: Ambient,
-    lamp: Vec3,
-    fill: Vec3,
+    pub light: Light,
+    pub ambient: Ambient,
+    /// Faces that may be seen in each band of rows, in ascending order.
+    in_band: Vec<Vec<u32>>,
     /// Pixels along a side of the picture.
-    size: usize,
+    pub size: usize,
 }
 
 impl Studio {
-    /// Lights the scene for a picture of `size` × `size` pixels, held to the range of sizes, seen from a direction, a unit vector from the
-    /// scene to the eye.
-    pub fn new(mesh: &Mesh, size: usize, direction: Vec3) -> Studio {
+    /// Lights the scene for pictures of `size` × `size` pixels, held to the range of sizes: one from where it is seen best, and where
+    /// `around` says so one from half around the vertical.
+    pub fn views(mesh: &Mesh, size: usize, around: bool) -> Vec<Studio> {
+        let proxy = Proxy::of(mesh.positions.as_slice(), &mesh.connectivity.to_faces());
+        let [x, y, z] = choose_direction(&proxy.positions, &proxy.faces);
+        let directions = [[x, y, z], [-x, y, -z]];
+        let views = directions[..if around { 2 } else { 1 }].iter();
+        views
+            .map(|&from| Studio::new(mesh, &proxy, size, from))
+            .collect()
+    }
+
+    /// From a direction, a unit vector from the scene to the eye.
+    fn new(mesh: &Mesh, proxy: &Proxy, size: usize, direction: Vec3) -> Studio {
         let size = super::canvas::side(size);
         let positions = mesh.positions.as_slice().to_vec();
         let faces = mesh.connectivity.to_faces();
         let camera = Camera::looking_from(direction, &positions, size as f64);
-        let [lamp, fill] = [[-0.55, 0.75, 0.55], [0.8, 0.15, 0.5]].map(|d| camera.oriented(d));
+        let screen: Vec<Vec3> = positions.iter().map(|&p| camera.project(p)).collect();
+        let floor = Floor::new(&proxy.positions, &proxy.faces);
         let mut studio = Studio {
             size,
-            screen: positions.iter().map(|&p| camera.project(p)).collect(),
+            in_band: in_bands(&faces, &screen, size),
+            screen,
             normals: corner_normals(mesh),
-            floor: Floor::new(&positions, &faces),
+            light: Light::new(camera.clone(), &floor, size),
             ambient: Ambient::default(),
-            lamp,
-            fill,
             camera,
             positions,
             faces,
@@ -118,22 +113,26 @@ impl Studio {
     /// The points that a coarser picture shows, and what is near them.
     fn look_around(&self) -> Ambient {
         let side = self.size.div_ceil(COARSER);
-        let coarser = |p: &Vec3| [p[0] / COARSER as f64, p[1] / COARSER as f64, p[2]];
+        let coarser = |p: &Vec3| sparse([p[0] / COARSER as f64, p[1] / COARSER as f64, p[2]]);
         let screen: Vec<Vec3> = self.screen.iter().map(coarser).collect();
-        let band = Band::of(side, 0..side * SAMPLES, &self.faces, &screen);
+        let band = Band::of(side, 0..side, &self.faces, &screen);
         let point = |at: usize| {
-            let (column, row) = (at % side, at / side * SAMPLES + SAMPLES / 2);
-            let (face, _) = band.seen(column, row);
-            let at = place(column, row).map(|x| x * COARSER as f64);
-            (face != NOTHING).then(|| self.point(&self.spot(face as usize, at)))
+            let face = band.objects()[at];
+            let [x, y] = place(at % side, at / side);
+            let at = [x * COARSER as f64, y * (COARSER * SAMPLES) as f64];
+            (face != NOTHING).then(|| {
+                let aspect = self.aspect(face);
+                let spot = aspect.spot(at);
+                (self.position(&spot), aspect.normal(at))
+            })
         };
         let points = (0..side * side).into_par_iter().map(point).collect();
         let picture = self.size as f64 * self.camera.depth / self.camera.zoom;
         Ambient::new(points, side, picture)
     }
 
-    /// The pictures of the surface in each of the paints, with marks on it.
-    pub fn draw<const N: usize>(&self, marks: &[Mark], paints: [&Paint; N]) -> [RgbImage; N] {
+    /// The pictures of the surface in a paint, with marks on it.
+    pub fn draw<const N: usize>(&self, marks: &[Mark], paint: &impl Paint<N>) -> [RgbImage; N] {
         let (size, count) = (self.size, self.faces.len() as u32);
         // On the screen, with the radius in pixels.
         let on_screen = |mark: &Mark| Mark {
@@ -142,121 +141,53 @@ impl Studio {
             ..*mark
         };
         let bars: Vec<Mark> = marks.iter().map(on_screen).collect();
-        let draw_band = |b: usize| {
+        let draw_band = |(b, mut pictures): (usize, [&mut [u8]; N])| {
             let rows = b * BAND..((b + 1) * BAND).min(size);
-            let of_samples = rows.start * SAMPLES..rows.end * SAMPLES;
-            let mut band = Band::of(size, of_samples, &self.faces, &self.screen);
+            let mut band = Band::new(size, rows.start * SAMPLES..rows.end * SAMPLES);
+            for &face in &self.in_band[b] {
+                band.draw(&self.on_screen(face), face);
+            }
             for (object, bar) in (count..).zip(&bars) {
                 band.draw_bar(bar.ends, bar.radius, 1.0 / self.camera.zoom, object);
             }
-            let pixels = rows.flat_map(|row| (0..size).map(move |column| (column, row)));
-            let pixel = |(x, y)| self.pixel(&band, (x, y), &bars, paints);
-            pixels.map(pixel).collect::<Vec<[[u8; 3]; N]>>()
+            let mut brush = Brush::new(self, &bars, paint);
+            for (k, row) in rows.enumerate() {
+                let seen = &band.objects()[k * SAMPLES * size..][..SAMPLES * size];
+                let line = 3 * k * size..3 * (k + 1) * size;
+                let lines = pictures
+                    .each_mut()
+                    .map(|picture| &mut picture[line.clone()]);
+                brush.row(row, seen, lines);
+            }
         };
-        let bands = (0..size.div_ceil(BAND)).into_par_iter();
-        let pixels: Vec<[[u8; 3]; N]> = bands.flat_map_iter(draw_band).collect();
-        std::array::from_fn(|n| {
-            RgbImage::from_fn(size as u32, size as u32, |x, y| {
-                Rgb(pixels[y as usize * size + x as usize][n])
-            })
-        })
-    }
-
-    /// Colour of a pixel in each of the paints.
-    fn pixel<const N: usize>(
-        &self,
-        band: &Band,
-        (column, row): (usize, usize),
-        bars: &[Mark],
-        paints: [&Paint; N],
-    ) -> [[u8; 3]; N] {
-        let samples: [(u32, [f64; 2]); SAMPLES] = std::array::from_fn(|k| {
-            let row = SAMPLES * row + k;
-            (band.seen(column, row).0, place(column, row))
-        });
-        let mut sums = [[0.0_f32; 3]; N];
-        for (k, &(object, _)) in samples.iter().enumerate() {
-            if samples[..k].iter().any(|s| s.0 == object) {
-                continue;
-            }
-            let (mut count, mut at) = (0.0, [0.0; 2]);
-            for (_, p) in samples.iter().filter(|s| s.0 == object) {
-                count += 1.0;
-                at = [at[0] + p[0], at[1] + p[1]];
-            }
-            let at = at.map(|x| x / count);
-            let shade = |albedo: Linear, (diffuse, gloss): (Linear, f32)| -> Linear {
-                std::array::from_fn(|i| albedo[i] * diffuse[i] + gloss)
-            };
-            let colours = if object == NOTHING {
-                [self.background(at); N]
-            } else if let Some(mark) = (object as usize).checked_sub(self.faces.len()) {
-                let light = self.light(self.bar_normal(&bars[mark], at), at, 1.0, 0.22);
-                [shade(bars[mark].colour, light); N]
-            } else {
-                let spot = self.spot(object as usize, at);
-                let (position, normal) = self.point(&spot);
-                let open = self.ambient.at(at, (position, normal));
-                let light = self.light(normal, at, open, 0.10);
-                let behind = is_behind(&self.on_screen(spot.face));
-                paints.map(|paint| match paint(&spot) {
-                    albedo if behind => shade(mix(albedo, INSIDE, 0.35), light).map(|c| 0.75 * c),
-                    albedo => shade(albedo, light),
-                })
-            };
-            for (sum, colour) in sums.iter_mut().zip(colours) {
-                // Clamped before the mean, or highlights would have ragged edges.
-                let share = count as f32 / SAMPLES as f32;
-                *sum = std::array::from_fn(|i| sum[i] + share * colour[i].clamp(0.0, 1.0));
-            }
-        }
-        sums.map(to_bytes)
+        let mut bytes: [Vec<u8>; N] = std::array::from_fn(|_| vec![0; 3 * size * size]);
+        let mut parts = bytes.each_mut().map(|b| b.chunks_mut(3 * size * BAND));
+        let bands: Vec<[&mut [u8]; N]> = (self.in_band.iter())
+            .map(|_| parts.each_mut().map(|part| part.next().unwrap_or_default()))
+            .collect();
+        bands.into_par_iter().enumerate().for_each(draw_band);
+        let side = size as u32;
+        bytes.map(|bytes| RgbImage::from_raw(side, side, bytes).unwrap_or_default())
     }
 
     /// Corners of a face on the screen.
-    fn on_screen(&self, face: usize) -> [Vec3; 3] {
-        self.faces[face].map(|v| self.screen[v as usize])
+    pub fn on_screen(&self, face: u32) -> [Vec3; 3] {
+        self.faces[face as usize].map(|v| self.screen[v as usize])
     }
 
-    /// The spot of a face at a place of the picture.
-    fn spot(&self, face: usize, at: [f64; 2]) -> Spot {
-        let screen = self.on_screen(face);
-        // Weights on the screen with their slopes; closeness undoes the perspective.
-        let parts = [0, 1, 2].map(|k| {
-            let (p, q, near) = (screen[(k + 1) % 3], screen[(k + 2) % 3], screen[k][2]);
-            let (right, down) = (near * (p[1] - q[1]), near * (q[0] - p[0]));
-            [right * (at[0] - p[0]) + down * (at[1] - p[1]), right, down]
-        });
-        let [sum, right, down] = [0, 1, 2].map(|i| parts[0][i] + parts[1][i] + parts[2][i]);
-        let (weights, sum) = match sum != 0.0 && sum.is_finite() {
-            true => (parts.map(|part| part[0] / sum), sum),
-            false => ([1.0, 0.0, 0.0], f64::INFINITY),
-        };
-        let slope =
-            |i: usize, of_sum: f64| [0, 1, 2].map(|k| (parts[k][i] - weights[k] * of_sum) / sum);
-        Spot {
-            face,
-            weights,
-            right: slope(1, right),
-            down: slope(2, down),
-        }
+    /// A face as the picture shows it.
+    pub fn aspect(&self, face: u32) -> Aspect {
+        Aspect::new(face, self.on_screen(face), &self.normals[face as usize])
     }
 
-    /// Position and unit normal, towards the eye, of a spot.
-    fn point(&self, spot: &Spot) -> Point {
-        let blend = |of: [Vec3; 3]| -> Vec3 {
-            std::array::from_fn(|i| (0..3).map(|k| spot.weights[k] * of[k][i]).sum())
-        };
-        let normal = unit(blend(self.normals[spot.face]));
-        let position = blend(self.faces[spot.face].map(|v| self.positions[v as usize]));
-        match is_behind(&self.on_screen(spot.face)) {
-            true => (position, normal.map(|x| -x)),
-            false => (position, normal),
-        }
+    /// The place of a spot in space.
+    pub fn position(&self, spot: &Spot) -> Vec3 {
+        let corners = self.faces[spot.face].map(|v| self.positions[v as usize]);
+        std::array::from_fn(|i| (0..3).map(|k| spot.weights[k] * corners[k][i]).sum())
     }
 
     /// Unit normal of a bar at a place of the picture.
-    fn bar_normal(&self, bar: &Mark, at: [f64; 2]) -> Vec3 {
+    pub fn bar_normal(&self, bar: &Mark, at: [f64; 2]) -> Vec3 {
         let [a, b] = bar.ends.map(|p| [p[0], p[1], 0.0]);
         let (axis, d) = (sub(b, a), sub([at[0], at[1], 0.0], a));
         let t = dot(d, axis) / dot(axis, axis).max(f64::MIN_POSITIVE);
@@ -264,53 +195,24 @@ impl Studio {
         let z = (1.0 - x * x - y * y).max(0.0).sqrt();
         self.camera.oriented([x, -y, z])
     }
-
-    /// Light on a point with this unit normal: from sky and ground, lamp and fill light, and a soft gloss.
-    fn light(&self, normal: Vec3, at: [f64; 2], open: f32, gloss: f32) -> (Linear, f32) {
-        let toward_eye = unit(self.camera.sight(at).map(|x| -x));
-        let upward = 0.5 + 0.5 * normal[1] as f32;
-        let sky = mix([0.35, 0.33, 0.31], [0.52, 0.55, 0.60], upward);
-        let [lamp, fill] = [self.lamp, self.fill].map(|d| dot(normal, d).max(0.0) as f32 * open);
-        let halfway = unit(along(self.lamp, 1.0, toward_eye));
-        let shine = dot(normal, halfway).max(0.0).powi(28) as f32;
-        let rim = (1.0 - dot(normal, toward_eye).max(0.0)).powi(4) as f32;
-        let diffuse = std::array::from_fn(|i| {
-            sky[i] * open + [0.62, 0.585, 0.53][i] * lamp + [0.17, 0.185, 0.21][i] * fill
-        });
-        (diffuse, (gloss * shine + 0.05 * rim) * open)
-    }
-
-    /// A pale studio whose floor takes the shadow.
-    fn background(&self, at: [f64; 2]) -> Linear {
-        let half = 0.5 * self.size as f64;
-        let [x, y] = [(at[0] - half) / half, (at[1] - 0.9 * half) / half];
-        let far = ((x * x + y * y) / (1.45 * 1.45)).min(1.0) as f32;
-        let studio = mix([0.93, 0.935, 0.94], [0.76, 0.78, 0.81], far);
-        let shadow = self.floor.shadow(self.camera.eye, self.camera.sight(at));
-        studio.map(|c| c * (1.0 - 0.55 * shadow))
-    }
 }
 
-/// Unit normals of the corners of all faces: the mean, by area, over the faces at the vertex that meet at a small angle.
-fn corner_normals(mesh: &Mesh) -> Vec<[Vec3; 3]> {
-    let connectivity = &mesh.connectivity;
-    let normals: Vec<(Vec3, f64)> = (connectivity.faces())
-        .map(|f| {
-            let [a, b, c] = mesh.face_positions(f);
-            let n = cross(sub(b, a), sub(c, a));
-            (unit(n), norm(n))
-        })
-        .collect();
-    let of_face = |f: usize| {
-        let own = normals[f].0;
-        [0, 1, 2].map(|k| {
-            let v = connectivity.tail(connectivity.corner_halfedge(FaceId::new(f), k));
-            let around = connectivity
-                .outgoing(v)
-                .map(|h| normals[connectivity.face(h).index()]);
-            let smooth = around.filter(|(n, _)| dot(*n, own) > CREASE);
-            unit(smooth.fold([0.0; 3], |sum, (n, area)| along(sum, area, n)))
-        })
+/// The faces that reach into each band of rows.
+fn in_bands(faces: &[[u32; 3]], screen: &[Vec3], size: usize) -> Vec<Vec<u32>> {
+    let bands = |face: &[u32; 3]| -> Range<usize> {
+        let rows = face.map(|v| screen[v as usize][1]);
+        let first = row_at(rows.into_iter().fold(f64::INFINITY, f64::min));
+        let end = row_at(rows.into_iter().fold(f64::NEG_INFINITY, f64::max)).min(size * SAMPLES);
+        match first < end {
+            true => first / (BAND * SAMPLES)..end.div_ceil(BAND * SAMPLES),
+            false => 0..0,
+        }
     };
-    (0..normals.len()).into_par_iter().map(of_face).collect()
+    let mut lists = vec![Vec::new(); size.div_ceil(BAND)];
+    for (number, face) in (0..).zip(faces) {
+        for band in bands(face) {
+            lists[band].push(number);
+        }
+    }
+    lists
 }

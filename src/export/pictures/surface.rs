@@ -1,11 +1,11 @@
 //! Pictures of an atlas in space.
 
-use super::checkerboard::Checkerboard;
+use super::brush::{Paint, Spot};
+use super::checkerboard::{Checkerboard, FaceBoard};
 use super::colour::{CUT, INK, Linear, NEGATIVE, POSITIVE};
-use super::scale::Range;
-use super::studio::{Mark, Spot, Studio};
+use super::scale::{Coloured, Range};
+use super::studio::{Mark, Studio};
 use super::text;
-use super::view::choose_direction;
 use crate::geometry::mesh::Mesh;
 use crate::product::AffineAtlas;
 use image::{Rgb, RgbImage};
@@ -18,9 +18,15 @@ pub fn surface(atlas: &AffineAtlas, size: usize) -> [RgbImage; 2] {
     let mesh = &atlas.mesh;
     let (board, values) = (Checkerboard::new(atlas), atlas.metric.log_scale.as_slice());
     let range = Range::of(mesh, values);
-    let squares = |spot: &Spot| board.colour(spot);
-    let scale = |spot: &Spot| range.colour(mesh, values, spot);
-    let [mut preview, mut log_scale] = studio(mesh, size).draw(&marks(atlas), [&squares, &scale]);
+    let paint = BoardAndScale {
+        board,
+        scale: Coloured {
+            range,
+            mesh,
+            values,
+        },
+    };
+    let [mut preview, mut log_scale] = studio(mesh, size).draw(&marks(atlas), &paint);
     legend(&mut preview, atlas);
     range.bar(&mut log_scale, "log scale u");
     [preview, log_scale]
@@ -33,24 +39,52 @@ pub fn painted(
     size: usize,
     colour: &(dyn Fn(usize, [f64; 3]) -> Linear + Sync),
 ) -> RgbImage {
-    let paint = |spot: &Spot| {
+    let [image] = studio(mesh, size).draw(&[], &Painted(colour));
+    image
+}
+
+/// The checkerboard, and the log scale.
+struct BoardAndScale<'a> {
+    board: Checkerboard<'a>,
+    scale: Coloured<'a>,
+}
+
+impl Paint<2> for BoardAndScale<'_> {
+    type OfFace = (FaceBoard, [f64; 3]);
+
+    fn of_face(&self, face: usize) -> Self::OfFace {
+        (self.board.of_face(face), self.scale.of_face(face))
+    }
+
+    fn colours(&self, (board, values): &mut Self::OfFace, spot: &Spot) -> [Linear; 2] {
+        let [scale] = self.scale.colours(values, spot);
+        [self.board.colour(board, spot), scale]
+    }
+}
+
+/// The mean of a few places of a pixel.
+struct Painted<'a>(&'a (dyn Fn(usize, [f64; 3]) -> Linear + Sync));
+
+impl Paint<1> for Painted<'_> {
+    type OfFace = ();
+
+    fn of_face(&self, _: usize) {}
+
+    fn colours(&self, (): &mut (), spot: &Spot) -> [Linear; 1] {
         let mut mean = [0.0; 3];
         for (x, y) in [(-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)] {
             let weight = |k: usize| spot.weights[k] + x * spot.right[k] + y * spot.down[k];
             let inside = [0, 1, 2].map(|k| weight(k).max(0.0));
             let sum: f64 = inside.iter().sum();
-            let seen = colour(spot.face, inside.map(|w| w / sum));
+            let seen = (self.0)(spot.face, inside.map(|w| w / sum));
             mean = std::array::from_fn(|i| mean[i] + 0.25 * seen[i]);
         }
-        mean
-    };
-    let [image] = studio(mesh, size).draw(&[], [&paint]);
-    image
+        [mean]
+    }
 }
 
 fn studio(mesh: &Mesh, size: usize) -> Studio {
-    let direction = choose_direction(mesh.positions.as_slice(), &mesh.connectivity.to_faces());
-    Studio::new(mesh, size, direction)
+    Studio::views(mesh, size, false).swap_remove(0)
 }
 
 /// Balls at the cones and bars along the cut.

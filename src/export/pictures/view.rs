@@ -1,6 +1,6 @@
 //! Where to look from: a perspective camera that shows much of the surface.
 
-use super::raster::{Band, NOTHING, SAMPLES};
+use super::raster::{Band, NOTHING, sparse};
 use crate::geometry::mesh::{bounding_box, cross, distance, dot, norm, sub};
 use rayon::prelude::*;
 
@@ -8,14 +8,22 @@ use rayon::prelude::*;
 pub type Vec3 = [f64; 3];
 
 /// a + s b
+#[inline]
 pub fn along(a: Vec3, s: f64, b: Vec3) -> Vec3 {
-    std::array::from_fn(|i| a[i] + s * b[i])
+    [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]]
 }
 
 /// Unit vector; the zero vector stays zero.
+#[inline]
 pub fn unit(a: Vec3) -> Vec3 {
     let n = norm(a);
-    if n > 0.0 { a.map(|x| x / n) } else { a }
+    let inverse = 1.0 / n;
+    match n > 0.0 && inverse.is_finite() {
+        true => [a[0] * inverse, a[1] * inverse, a[2] * inverse],
+        // Too small for its inverse.
+        false if n > 0.0 => [a[0] / n, a[1] / n, a[2] / n],
+        false => a,
+    }
 }
 
 /// Camera axes, eye and the mapping to the screen.
@@ -31,6 +39,8 @@ pub struct Camera {
     pub depth: f64,
     /// Pixels a unit of (x / depth).
     pub zoom: f64,
+    /// Its inverse.
+    per_pixel: f64,
     /// Screen position of the axis of view.
     pub principal: [f64; 2],
 }
@@ -55,6 +65,7 @@ impl Camera {
             eye: along(centre, EYE_DISTANCE * radius, back),
             depth: EYE_DISTANCE * radius,
             zoom: 1.0,
+            per_pixel: 1.0,
             principal: [0.0; 2],
         };
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
@@ -68,6 +79,7 @@ impl Camera {
         let extent = (high[0] - low[0]).max(high[1] - low[1]);
         if extent > 0.0 && extent.is_finite() {
             camera.zoom = FILL * size / extent;
+            camera.per_pixel = 1.0 / camera.zoom;
             camera.principal =
                 std::array::from_fn(|i| 0.5 * size - 0.5 * camera.zoom * (low[i] + high[i]));
         }
@@ -92,10 +104,15 @@ impl Camera {
     }
 
     /// Direction (not unit; depth 1) of the line of sight through a point of the screen.
+    #[inline]
     pub fn sight(&self, screen: [f64; 2]) -> Vec3 {
-        let x = (screen[0] - self.principal[0]) / self.zoom;
-        let y = (self.principal[1] - screen[1]) / self.zoom;
-        std::array::from_fn(|i| x * self.right[i] + y * self.up[i] - self.back[i])
+        let x = (screen[0] - self.principal[0]) * self.per_pixel;
+        let y = (self.principal[1] - screen[1]) * self.per_pixel;
+        along(
+            along(along([0.0; 3], x, self.right), y, self.up),
+            -1.0,
+            self.back,
+        )
     }
 }
 
@@ -111,46 +128,59 @@ pub fn finite_box(points: &[Vec3]) -> (Vec3, Vec3) {
     }
 }
 
-/// Columns of pixels of the trial pictures, and rows of samples.
+/// Pixels along a side of the trial pictures.
 const TRIAL: usize = 48;
-const ROWS: usize = TRIAL * SAMPLES;
+/// Turns around the vertical, and elevations in degrees, of the views that are tried.
+const TURNS: usize = 24;
+const ELEVATIONS: [f64; 3] = [26.0, 16.0, 42.0];
+/// Turns that are tried from all elevations: the best from the first.
+const PROMISING: usize = 4;
 
 /// The direction to look from: of many three-quarter views from above, the one that shows most of the
 /// surface's front, largely, and with its holes open. `y` is up, as in glTF and most OBJ files.
 pub fn choose_direction(positions: &[Vec3], faces: &[[u32; 3]]) -> Vec3 {
-    let candidate = |k: usize| {
-        let (sine, cosine) = [16.0_f64, 26.0, 42.0][k % 3].to_radians().sin_cos();
-        let (x, z) = (15.0 * (k / 3) as f64).to_radians().sin_cos();
+    let candidate = |(turn, elevation): (usize, usize)| {
+        let (sine, cosine) = ELEVATIONS[elevation].to_radians().sin_cos();
+        let (x, z) = (360.0 / TURNS as f64 * turn as f64).to_radians().sin_cos();
         [cosine * x, sine, cosine * z]
     };
-    let scores: Vec<f64> = (0..72)
-        .into_par_iter()
-        .map(|k| score(candidate(k), positions, faces))
-        .collect();
-    candidate((0..72).fold(0, |best, k| if scores[k] > scores[best] { k } else { best }))
+    let scored = |views: Vec<(usize, usize)>| -> Vec<(f64, (usize, usize))> {
+        let score = |view| (score(candidate(view), positions, faces), view);
+        views.into_par_iter().map(score).collect()
+    };
+    let mut tried = scored((0..TURNS).map(|turn| (turn, 0)).collect());
+    // Of equally good ones the first.
+    tried.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let promising = tried[..PROMISING].iter().map(|(_, (turn, _))| *turn);
+    let others = promising.flat_map(|turn| (1..ELEVATIONS.len()).map(move |e| (turn, e)));
+    tried.extend(scored(others.collect()));
+    let better = |best: (f64, _), next: (f64, _)| if next.0 > best.0 { next } else { best };
+    candidate(tried.iter().copied().fold(tried[0], better).1)
 }
 
 /// How good a view is: visible front, size on the picture and open holes against what is dull.
 fn score(direction: Vec3, positions: &[Vec3], faces: &[[u32; 3]]) -> f64 {
     let camera = Camera::looking_from(direction, positions, TRIAL as f64);
-    let screen: Vec<Vec3> = positions.iter().map(|&p| camera.project(p)).collect();
-    let band = Band::of(TRIAL, 0..ROWS, faces, &screen);
-    let seen = (0..TRIAL * ROWS).map(|at| band.seen(at % TRIAL, at / TRIAL).0);
-    let share = |n: usize| n as f64 / (TRIAL * ROWS) as f64;
-    let shown = seen.clone().filter(|&face| face != NOTHING);
-    let corners = |face: u32| faces[face as usize].map(|v| screen[v as usize]);
-    let back = shown
-        .clone()
-        .filter(|&face| is_behind(&corners(face)))
-        .count();
-    let front = share(shown.count() - back);
-    let holes = holes(seen.map(|face| face == NOTHING).collect());
+    let screen: Vec<Vec3> = (positions.iter())
+        .map(|&p| sparse(camera.project(p)))
+        .collect();
+    let band = Band::of(TRIAL, 0..TRIAL, faces, &screen);
+    let share = |n: usize| n as f64 / (TRIAL * TRIAL) as f64;
+    let (mut front, mut back) = (0, 0);
+    for &face in band.objects().iter().filter(|&&face| face != NOTHING) {
+        match is_behind(&faces[face as usize].map(|v| screen[v as usize])) {
+            true => back += 1,
+            false => front += 1,
+        }
+    }
+    let open = band.objects().iter().map(|&face| face == NOTHING);
+    let holes = holes(open.collect());
     let hole_area: f64 = holes.iter().map(|&n| share(n)).sum();
     // A look along an axis is flat, and models face +z.
     let [x, _, z] = direction.map(f64::abs);
     let oblique = 1.0 - 5.0 * (x.max(z) / x.hypot(z) - 0.965).max(0.0);
     let elevation = 1.0 - 0.8 * (direction[1] - 0.36).abs();
-    let shown = front - 1.5 * share(back) + 0.06 * holes.len() as f64 + hole_area;
+    let shown = share(front) - 1.5 * share(back) + 0.06 * holes.len() as f64 + hole_area;
     shown * oblique * elevation + 0.02 * direction[2]
 }
 
@@ -170,14 +200,14 @@ fn holes(mut open: Vec<bool>) -> Vec<usize> {
             }
             size += 1;
             let (column, row) = (at % TRIAL, at / TRIAL);
-            if column == 0 || row == 0 || column + 1 == TRIAL || row + 1 == ROWS {
+            if column == 0 || row == 0 || column + 1 == TRIAL || row + 1 == TRIAL {
                 enclosed = false;
             }
             let before = [1, TRIAL].map(|step| at.saturating_sub(step));
             let after = [1, TRIAL].map(|step| (at + step).min(open.len() - 1));
             stack.extend(before.into_iter().chain(after).filter(|&at| open[at]));
         }
-        if enclosed && size >= 12 {
+        if enclosed && size >= 3 {
             sizes.push(size);
         }
     }
@@ -202,7 +232,7 @@ mod tests {
 
     #[test]
     fn enclosed_background_is_a_hole() {
-        let mut open = vec![true; TRIAL * ROWS];
+        let mut open = vec![true; TRIAL * TRIAL];
         let square = |low: usize, high: usize| {
             (low..high).flat_map(move |y| (low..high).map(move |x| y * TRIAL + x))
         };

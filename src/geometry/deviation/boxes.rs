@@ -1,7 +1,8 @@
 //! The nearest triangle to a point, through a tree of boxes.
 
 use super::{Triangles, corners, normal};
-use crate::geometry::mesh::{bounding_box, cross, distance_to_segment, dot, norm, sub};
+use crate::geometry::mesh::{cross, distance_to_segment, dot, norm, sub};
+use std::ops::Range;
 
 /// Most triangles in a leaf.
 const LEAF: usize = 4;
@@ -10,7 +11,9 @@ const NONE: u32 = u32::MAX;
 /// So many triangles side by side are longer than this part of their box only where they are long and thin.
 const MANY: (usize, f64) = (8, 0.25);
 
-/// Triangles sorted into nested boxes: each node halves its triangles at the median of the widest axis of their centres.
+/// Triangles sorted into nested boxes, along the Morton curve through their centres: each node is parted where the first bit of their codes
+/// changes, which halves its cube (Lauterbach et al., *Fast BVH construction on GPUs*, 2009). Sorting numbers once takes a small part of
+/// the time of looking for medians again and again.
 pub(super) struct BoxTree {
     nodes: Vec<Node>,
     turned: Vec<TurnedBox>,
@@ -49,16 +52,24 @@ pub(super) struct Nearest {
 impl BoxTree {
     /// `None` where there are no triangles.
     pub fn new(surface: Triangles<'_>) -> Option<Self> {
-        let mut triangles: Vec<_> = surface.faces.iter().map(|&f| corners(surface, f)).collect();
-        if triangles.is_empty() || triangles.len() > u32::MAX as usize / 2 {
+        let count = surface.faces.len();
+        if count == 0 || count > u32::MAX as usize / 2 {
             return None;
         }
-        let (mut nodes, mut turned) = (Vec::with_capacity(triangles.len()), Vec::new());
-        divide(&mut triangles, 0, &mut nodes, &mut turned);
+        let (codes, order) = along_curve(surface);
+        let mut division = Division {
+            triangles: (order.iter())
+                .map(|&f| corners(surface, surface.faces[f as usize]))
+                .collect(),
+            codes,
+            nodes: Vec::with_capacity(count),
+            turned: Vec::new(),
+        };
+        division.divide(0..count);
         Some(Self {
-            nodes,
-            turned,
-            triangles,
+            nodes: division.nodes,
+            turned: division.turned,
+            triangles: division.triangles,
         })
     }
 
@@ -77,12 +88,14 @@ impl BoxTree {
         let mut looks = 1;
         let near = near.min(self.triangles.len() - 1);
         let mut best = (squared_distance(p, self.triangles[near]), near);
-        let mut stack = vec![0];
-        while let Some(at) = stack.pop() {
-            let node = &self.nodes[at];
-            if self.squared_bound(p, node) >= best.0 {
+        // Nodes with the least that their triangles can be away.
+        let mut stack = Vec::with_capacity(64);
+        stack.push((self.squared_bound(p, &self.nodes[0]), 0));
+        while let Some((bound, at)) = stack.pop() {
+            if bound >= best.0 {
                 continue;
             }
+            let node = &self.nodes[at];
             if node.count > 0 {
                 let first = node.at as usize;
                 looks += node.count as usize;
@@ -92,12 +105,13 @@ impl BoxTree {
                         best = (d, face);
                     }
                 }
-            } else {
-                let (a, b) = (at + 1, node.at as usize);
-                let [to_a, to_b] = [a, b].map(|i| self.squared_bound(p, &self.nodes[i]));
-                let a_first = to_a <= to_b;
-                stack.extend(if a_first { [b, a] } else { [a, b] });
+                continue;
             }
+            let child = |at: usize| (self.squared_bound(p, &self.nodes[at]), at);
+            let (a, b) = (child(at + 1), child(node.at as usize));
+            let (near, far) = if a.0 <= b.0 { (a, b) } else { (b, a) };
+            // The nearer one is looked into first.
+            stack.extend([far, near].into_iter().filter(|(bound, _)| *bound < best.0));
         }
         let found = Nearest {
             distance: best.0.sqrt(),
@@ -116,59 +130,123 @@ impl BoxTree {
     }
 }
 
-/// Returns the square of the longest side.
-fn divide(
-    triangles: &mut [[[f64; 3]; 3]],
-    first: usize,
-    nodes: &mut Vec<Node>,
-    turned: &mut Vec<TurnedBox>,
-) -> f64 {
-    let at = nodes.len();
-    let is_leaf = triangles.len() <= LEAF;
-    // That of a node with children follows from theirs.
-    let around = &triangles[..if is_leaf { triangles.len() } else { 1 }];
-    let (low, high) = bounding_box(around.as_flattened());
-    nodes.push(Node {
-        low,
-        high,
-        turned: NONE,
-        at: first as u32,
-        count: if is_leaf { triangles.len() as u32 } else { 0 },
-    });
-    if is_leaf {
-        let sides = triangles.iter().flat_map(|t| (0..3).map(|k| side(t, k)));
-        return sides.map(|d| dot(d, d)).fold(0.0, f64::max);
-    }
-    // Three times the centres, which sort like them.
-    let centre = |t: &[[f64; 3]; 3], axis: usize| t[0][axis] + t[1][axis] + t[2][axis];
-    let extent = |axis: usize| {
-        let centres = triangles.iter().map(|t| centre(t, axis));
-        let (low, high) = centres.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
-            (a.min(x), b.max(x))
-        });
-        high - low
+/// Most bits of a coordinate in a code of the Morton curve.
+const BITS: u32 = 21;
+
+/// The codes of a surface's faces in ascending order, and whose they are.
+fn along_curve(surface: Triangles<'_>) -> (Vec<u64>, Vec<u32>) {
+    // Three times the centres.
+    let centre = |f: &[u32; 3]| -> [f64; 3] {
+        let [a, b, c] = corners(surface, *f);
+        [a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2]]
     };
-    let extents = [0, 1, 2].map(extent);
-    let axis = (0..3).fold(
-        0,
-        |best, i| if extents[i] > extents[best] { i } else { best },
-    );
-    let half = triangles.len() / 2;
-    triangles.select_nth_unstable_by(half, |a, b| centre(a, axis).total_cmp(&centre(b, axis)));
-    let (left, right) = triangles.split_at_mut(half);
-    let longest = divide(left, first, nodes, turned);
-    nodes[at].at = nodes.len() as u32;
-    let longest = longest.max(divide(right, first + half, nodes, turned));
-    let [a, b] = [&nodes[at + 1], &nodes[nodes[at].at as usize]];
-    let low = [0, 1, 2].map(|i| a.low[i].min(b.low[i]));
-    let high = [0, 1, 2].map(|i| a.high[i].max(b.high[i]));
-    (nodes[at].low, nodes[at].high) = (low, high);
-    let diagonal = sub(high, low);
-    if triangles.len() > MANY.0 && longest > MANY.1 * MANY.1 * dot(diagonal, diagonal) {
-        nodes[at].turned = turned.len() as u32;
-        turned.push(TurnedBox::around(triangles));
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for c in surface.faces.iter().map(centre) {
+        for i in 0..3 {
+            (low[i], high[i]) = (low[i].min(c[i]), high[i].max(c[i]));
+        }
     }
-    longest
+    // Code and number of a face in one word, which is quick to sort.
+    let of_number = usize::BITS - surface.faces.len().leading_zeros();
+    let bits = ((u64::BITS - of_number) / 3).min(BITS);
+    let longest = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
+    let cells = ((1_u64 << bits) - 1) as f64 / longest.max(f64::MIN_POSITIVE);
+    let code = |c: [f64; 3]| {
+        // Casts of what is no number are 0.
+        let place = |i: usize| spread(((c[i] - low[i]) * cells) as u64);
+        place(0) << 2 | place(1) << 1 | place(2)
+    };
+    let mut words: Vec<u64> = (0..)
+        .zip(surface.faces)
+        .map(|(number, f): (u64, _)| code(centre(f)) << of_number | number)
+        .collect();
+    words.sort_unstable();
+    let numbers = words
+        .iter()
+        .map(|word| (word & ((1 << of_number) - 1)) as u32);
+    let numbers = numbers.collect();
+    for word in &mut words {
+        *word >>= of_number;
+    }
+    (words, numbers)
+}
+
+/// Two zeros before each of the last [`BITS`] bits.
+fn spread(x: u64) -> u64 {
+    let mut x = x & ((1 << BITS) - 1);
+    for (shift, mask) in [
+        (32, 0x001f_0000_0000_ffff),
+        (16, 0x001f_0000_ff00_00ff),
+        (8, 0x100f_00f0_0f00_f00f),
+        (4, 0x10c3_0c30_c30c_30c3),
+        (2, 0x1249_2492_4924_9249),
+    ] {
+        x = (x | x << shift) & mask;
+    }
+    x
+}
+
+/// A tree that is being made.
+struct Division {
+    triangles: Vec<[[f64; 3]; 3]>,
+    codes: Vec<u64>,
+    nodes: Vec<Node>,
+    turned: Vec<TurnedBox>,
+}
+
+impl Division {
+    /// Adds the nodes of some triangles; gives the square of their longest side.
+    fn divide(&mut self, range: Range<usize>) -> f64 {
+        let (at, count) = (self.nodes.len(), range.len());
+        let is_leaf = count <= LEAF;
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        // That of a node with children follows from theirs.
+        let around = range.start..if is_leaf { range.end } else { range.start };
+        for p in self.triangles[around].as_flattened() {
+            for i in 0..3 {
+                (low[i], high[i]) = (low[i].min(p[i]), high[i].max(p[i]));
+            }
+        }
+        self.nodes.push(Node {
+            low,
+            high,
+            turned: NONE,
+            at: range.start as u32,
+            count: if is_leaf { count as u32 } else { 0 },
+        });
+        if is_leaf {
+            let sides = self.triangles[range].iter();
+            let sides = sides.flat_map(|t| (0..3).map(|k| side(t, k)));
+            return sides.map(|d| dot(d, d)).fold(0.0, f64::max);
+        }
+        let middle = self.middle(range.clone());
+        let longest = self.divide(range.start..middle);
+        self.nodes[at].at = self.nodes.len() as u32;
+        let longest = longest.max(self.divide(middle..range.end));
+        let [a, b] = [&self.nodes[at + 1], &self.nodes[self.nodes[at].at as usize]];
+        let (mut low, mut high) = (a.low, a.high);
+        for i in 0..3 {
+            (low[i], high[i]) = (low[i].min(b.low[i]), high[i].max(b.high[i]));
+        }
+        (self.nodes[at].low, self.nodes[at].high) = (low, high);
+        let diagonal = sub(high, low);
+        if count > MANY.0 && longest > MANY.1 * MANY.1 * dot(diagonal, diagonal) {
+            self.nodes[at].turned = self.turned.len() as u32;
+            self.turned.push(TurnedBox::around(&self.triangles[range]));
+        }
+        longest
+    }
+
+    /// Where the first bit of the codes that is not the same for all changes; half where all codes are the same.
+    fn middle(&self, range: Range<usize>) -> usize {
+        let codes = &self.codes[range.clone()];
+        let [first, last] = [codes[0], codes[codes.len() - 1]];
+        let half = match (first ^ last).checked_ilog2() {
+            Some(bit) => codes.partition_point(|code| code >> bit == first >> bit),
+            None => codes.len() / 2,
+        };
+        range.start + half
+    }
 }
 
 fn side(t: &[[f64; 3]; 3], k: usize) -> [f64; 3] {
@@ -218,7 +296,8 @@ impl TurnedBox {
 
 fn squared_to_box(p: [f64; 3], node: &Node) -> f64 {
     let off = |i: usize| (node.low[i] - p[i]).max(p[i] - node.high[i]).max(0.0);
-    (0..3).map(|i| off(i) * off(i)).sum()
+    let off = [off(0), off(1), off(2)];
+    dot(off, off)
 }
 
 /// Squared distance of a point from a triangle: which of its corners, sides and inside is nearest follows from six
