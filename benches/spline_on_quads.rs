@@ -75,8 +75,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     write(surface, &spline, middle)
 }
 
+type PointsAndFaces<const N: usize> = (Vec<Point>, Vec<[u32; N]>);
+
 /// Points and polygons of an OBJ, all with as many corners.
-fn read<const N: usize>(path: &str) -> Result<(Vec<Point>, Vec<[u32; N]>), Box<dyn Error>> {
+fn read<const N: usize>(path: &str) -> Result<PointsAndFaces<N>, Box<dyn Error>> {
     let (mut points, mut polygons) = (Vec::new(), Vec::new());
     for line in read_to_string(path)?.lines() {
         let mut words = line.split_whitespace();
