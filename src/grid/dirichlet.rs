@@ -18,7 +18,7 @@ use rayon::prelude::*;
 /// Most steps.
 const MOST_STEPS: usize = 40;
 /// It ends where a step lowers the energy by less than this part.
-const LEAST_GAIN: f64 = 3e-4;
+const LEAST_GAIN: f64 = 1e-4;
 /// Part of the way to where a face loses its area.
 const BEFORE_FLAT: f64 = 0.9;
 /// Part of the decrease that the gradient promises (Armijo).
