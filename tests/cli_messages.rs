@@ -637,7 +637,8 @@ fn help() {
                                  version
       -n, --dry-run              Say what would be built, and why, and build nothing
           --depfile <FILE>       Write for Make and Ninja which files OUT/manifest.jsonl was made from
-          --profile <FILE>       Write where the time goes, as a trace that Perfetto (ui.perfetto.dev) opens
+          --profile <FILE>       Write where the time goes, as a trace that Perfetto (ui.perfetto.dev)
+                                 opens
       -j, --jobs <N>             Meshes to build at the same time; 0 takes one for each core [default:
                                  run.jobs of the configuration]
       -q, --quiet                Show errors only

@@ -46,7 +46,7 @@ use std::io;
 
 /// Writes all data files of one component into a staging folder: `atlas.json`, `atlas.npz`,
 /// `surface.glb` and the images. `subfolder` is `""` for an asset of one component, else
-/// [`folder::component_name`]. Gives the paths of the files inside the staging folder, in the order written.
+/// [`folder::component_name`]. Gives the paths of the files inside the staging folder.
 pub fn write_component(
     staging: &Staging,
     subfolder: &str,
@@ -64,36 +64,48 @@ pub fn write_component(
     staging.write(&name, document.to_text().as_bytes())?;
     files.push(name);
 
-    let part = part!("npz");
-    // Through memory: a zip writer that meets a full disk complains on the terminal when dropped.
     let name = inside("atlas.npz");
-    let mut archive = io::Cursor::new(Vec::new());
-    npz::write(atlas, &mut archive).map_err(|e| e.at(&staging.target().join(&name)))?;
-    staging.write(&name, archive.get_ref())?;
+    let arrays = || -> Result<(), ExportError> {
+        let _part = part!("npz");
+        // Through memory: a zip writer that meets a full disk complains on the terminal when dropped.
+        let mut archive = io::Cursor::new(Vec::new());
+        npz::write(atlas, &mut archive).map_err(|e| e.at(&staging.target().join(&name)))?;
+        staging.write(&name, archive.get_ref())
+    };
+    let others = || write_others(staging, &inside, atlas, &document, provenance);
+    let (arrays, others) = rayon::join(arrays, others);
+    arrays?;
     files.push(name);
+    files.extend(others?);
+    Ok(files)
+}
 
-    drop(part);
+/// Images, quads and the GLB.
+fn write_others(
+    staging: &Staging,
+    inside: &(impl Fn(&str) -> String + Sync),
+    atlas: &AffineAtlas,
+    document: &atlas_json::Document,
+    provenance: &Provenance,
+) -> Result<Vec<String>, ExportError> {
     let part = part!("images");
     // Compression takes most of the time, and images do not depend on each other.
-    let images: Vec<_> = (atlas.images.par_iter().enumerate())
-        .map(|(id, image)| {
-            let name = inside(&atlas_json::image_path(id));
-            let mut file = staging.create(&name)?;
-            let label = exr::label(&document, id, provenance);
-            exr::write(image, &atlas.image_params, &label.to_text(), &mut file)
-                .map_err(|e| e.at(file.path()))?;
-            file.finish()?;
-            Ok(name)
-        })
-        .collect();
-    for name in images {
-        files.push(name?);
-    }
+    let images = (atlas.images.par_iter().enumerate()).map(|(id, image)| {
+        let name = inside(&atlas_json::image_path(id));
+        let mut file = staging.create(&name)?;
+        let label = exr::label(document, id, provenance);
+        exr::write(image, &atlas.image_params, &label.to_text(), &mut file)
+            .map_err(|e| e.at(file.path()))?;
+        file.finish()?;
+        Ok(name)
+    });
+    let images: Vec<Result<String, ExportError>> = images.collect();
+    let mut files = images.into_iter().collect::<Result<Vec<_>, _>>()?;
     drop(part);
 
     if let (Some(places), Some(label)) = (
         &atlas.patches.packed,
-        exr::packed_label(&document, provenance),
+        exr::packed_label(document, provenance),
     ) {
         let name = inside(&label.packed.image);
         let mut file = staging.create(&name)?;
@@ -106,16 +118,14 @@ pub fn write_component(
 
     if let Some(grid) = &atlas.grid {
         let name = inside("quads.obj");
-        staging.write(
-            &name,
-            quads::text(atlas, grid, &provenance.appearance.materials).as_bytes(),
-        )?;
+        let text = quads::text(atlas, grid, &provenance.appearance.materials);
+        staging.write(&name, text.as_bytes())?;
         files.push(name);
     }
 
     let _part = part!("glb");
     let name = inside("surface.glb");
-    let bytes = glb::encode(atlas, &document, provenance)?;
+    let bytes = glb::encode(atlas, document, provenance)?;
     staging.write(&name, &bytes)?;
     files.push(name);
     Ok(files)

@@ -11,14 +11,15 @@ use super::blocks::{Block, Blocks, Piece, corner, sides};
 use super::error::GridError;
 use super::packing::{Outline, Packed, pack};
 use super::quads::QuadMesh;
+use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-/// What part of the rectangle around an island its cells must be, from the fewest islands to the blocks alone.
-const FILLED: [f64; 5] = [0.5, 0.65, 0.8, 0.95, 2.0];
+/// What part of the rectangle around an island its cells must be: answers that are tried; the last leaves blocks alone.
+const FILLED: [f64; 9] = [0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 2.0];
 /// A square is well filled where this part of it is cells.
 const WELL: f64 = 0.8;
-/// Longest side of an island of several blocks, in sides of a square with all cells.
-const LONGEST: f64 = 0.75;
+/// Longest side of an island of several blocks, in sides of a square with all cells: answers that are tried.
+const LONGEST: [f64; 2] = [1.0, 0.5];
 /// Blocks are joined where there are at most so many: more are hardly looked at as one picture.
 const MOST_JOINED: usize = 1000;
 
@@ -143,6 +144,17 @@ impl Island {
         [0, 1].map(|i| self.high[i].max(other.high[i]) - self.low[i].min(other.low[i]))
     }
 
+    fn outline(&self) -> Outline {
+        let at = |c: &[i64; 2], i: usize| ((c[i] - 1) / 2 - self.low[i]) as usize;
+        let cells = self.cells.iter().map(|c| [at(c, 0), at(c, 1)]);
+        let mut cells: Vec<[usize; 2]> = cells.collect();
+        cells.sort_unstable();
+        Outline {
+            size: [0, 1].map(|i| (self.high[i] - self.low[i]) as usize),
+            cells,
+        }
+    }
+
     fn join(&mut self, other: Self) {
         self.blocks.extend(other.blocks);
         self.cells.extend(other.cells);
@@ -174,14 +186,14 @@ fn beside(blocks: &[Block], b: usize, s: usize, piece: &Piece) -> Option<(usize,
 }
 
 /// Joins blocks to islands that fill so much of the rectangles around them.
-fn joined(mesh: &QuadMesh, blocks: &Blocks, filled: f64) -> Vec<Island> {
+fn joined(mesh: &QuadMesh, blocks: &Blocks, filled: f64, longest: f64) -> Vec<Island> {
     let own = &blocks.blocks;
     let mut islands: Vec<Option<Island>> = Vec::with_capacity(own.len());
     islands.extend((0..own.len()).map(|b| Some(Island::of(mesh, own, b))));
     if filled > 1.0 || own.len() > MOST_JOINED {
         return islands.into_iter().flatten().collect();
     }
-    let longest = LONGEST * (mesh.quads.len() as f64).sqrt();
+    let longest = longest * (mesh.quads.len() as f64).sqrt();
     // Of every block its island, and how it lies there.
     let mut home: Vec<(usize, Motion)> = (0..own.len()).map(|b| (b, Motion::NONE)).collect();
     let mut common: Vec<(usize, usize, &Piece)> = Vec::new();
@@ -232,37 +244,39 @@ pub(super) fn arrange(
     samples: usize,
     gutter: usize,
 ) -> Result<Islands, GridError> {
-    let mut best: Option<(f64, Vec<Island>, Packed)> = None;
-    for filled in FILLED {
-        let islands = joined(mesh, blocks, filled);
-        if best
-            .as_ref()
-            .is_some_and(|(_, found, _)| found.len() == islands.len())
-        {
-            continue;
+    let answers = FILLED
+        .into_iter()
+        .flat_map(|filled| LONGEST.map(|longest| [filled, longest]));
+    let answers: Vec<[f64; 2]> = answers.collect();
+    let islands = answers
+        .par_iter()
+        .map(|&[filled, longest]| joined(mesh, blocks, filled, longest));
+    let mut islands: Vec<Vec<Island>> = islands.collect();
+    islands.sort_by_key(Vec::len);
+    islands.dedup_by_key(|islands| islands.len());
+    let texels = mesh.quads.len() as f64 * (samples * samples) as f64;
+    let well = (texels / WELL).sqrt() as usize;
+    let packed = |islands: &[Island], most| {
+        let outlines: Vec<Outline> = islands.iter().map(Island::outline).collect();
+        pack(&outlines, samples, gutter, most)
+    };
+    let first = islands
+        .iter()
+        .enumerate()
+        .find_map(|(i, islands)| Some((i, packed(islands, well)?)));
+    // Otherwise what fills a square best.
+    let best = || {
+        let mut best: Option<(usize, Packed)> = None;
+        for (i, islands) in islands.iter().enumerate() {
+            let most = best
+                .as_ref()
+                .map_or(usize::MAX, |(_, packed)| packed.side - 1);
+            best = packed(islands, most).map(|packed| (i, packed)).or(best);
         }
-        let outline = |island: &Island| Outline {
-            size: [0, 1].map(|i| (island.high[i] - island.low[i]) as usize),
-            cells: {
-                let at = |c: &[i64; 2], i: usize| ((c[i] - 1) / 2 - island.low[i]) as usize;
-                let cells = island.cells.iter().map(|c| [at(c, 0), at(c, 1)]);
-                let mut cells: Vec<[usize; 2]> = cells.collect();
-                cells.sort_unstable();
-                cells
-            },
-        };
-        let outlines: Vec<Outline> = islands.iter().map(outline).collect();
-        let packed = pack(&outlines, samples, gutter);
-        let texels = mesh.quads.len() as f64 * (samples * samples) as f64;
-        let part = texels / (packed.side * packed.side) as f64;
-        if best.as_ref().is_none_or(|(most, ..)| part > *most) {
-            best = Some((part, islands, packed));
-        }
-        if part >= WELL {
-            break;
-        }
-    }
-    let (_, islands, packed) = best.unwrap_or_default();
+        best
+    };
+    let (i, packed) = first.or_else(best).unwrap_or_default();
+    let islands = islands.swap_remove(i);
     let mut place = vec![(0, [0; 2]); blocks.blocks.len()];
     for (number, (island, is_turned)) in islands.iter().zip(&packed.is_turned).enumerate() {
         let frame = Motion {

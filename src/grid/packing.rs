@@ -226,8 +226,13 @@ fn strip(
     Some((places, height))
 }
 
-/// Packs islands whose cells are `samples` texels wide, with so many texels between them.
-pub(super) fn pack(outlines: &[Outline], samples: usize, gutter: usize) -> Packed {
+/// Packs islands whose cells are `samples` texels wide, with so many texels between them, into a square whose sides have `most` texels at most, if they fit.
+pub(super) fn pack(
+    outlines: &[Outline],
+    samples: usize,
+    gutter: usize,
+    most: usize,
+) -> Option<Packed> {
     let cells: usize = outlines.iter().map(|o| o.cells.len()).sum();
     let texels = (cells as f64).sqrt() * samples as f64;
     let unit = gutter.max(1).max((texels / FINEST as f64).ceil() as usize);
@@ -262,7 +267,7 @@ pub(super) fn pack(outlines: &[Outline], samples: usize, gutter: usize) -> Packe
         .flat_map(|o| (0..tries).map(move |w| (o, w)))
         .collect();
     // The least side so far: a strip that gets higher is given up, whichever was first.
-    let least = AtomicUsize::new(usize::MAX);
+    let least = AtomicUsize::new(most / unit);
     let of = |&(o, w): &(usize, usize)| {
         let width = (root * (1.0 + 0.04 * w as f64)).ceil() as usize;
         let width = width.max(widest);
@@ -272,20 +277,20 @@ pub(super) fn pack(outlines: &[Outline], samples: usize, gutter: usize) -> Packe
             .map(|(([x, _], t), m)| x + m[usize::from(*t)].size[0])
             .max();
         let side = reach.unwrap_or(1).max(height);
-        least.fetch_min(side, Ordering::Relaxed);
-        Some((side, places))
+        let before = least.fetch_min(side, Ordering::Relaxed);
+        (side <= before).then_some((side, places))
     };
     let tried: Vec<Option<(usize, Vec<Placed>)>> = jobs.par_iter().map(of).collect();
     let best = tried.into_iter().flatten().min_by_key(|(side, _)| *side);
-    let (side, places) = best.unwrap_or_default();
-    Packed {
+    let (side, places) = best?;
+    Some(Packed {
         corner: places
             .iter()
             .map(|(at, _)| at.map(|n| n * unit + gutter / 2))
             .collect(),
         is_turned: places.iter().map(|(_, is_turned)| *is_turned).collect(),
         side: side.max(1) * unit,
-    }
+    })
 }
 
 #[cfg(test)]
@@ -341,7 +346,7 @@ mod tests {
             outline(&["#"]),
         ];
         for (samples, gutter) in [(8, 2), (4, 1), (8, 0), (5, 3), (1, 2), (64, 2)] {
-            let packed = pack(&outlines, samples, gutter);
+            let packed = pack(&outlines, samples, gutter, usize::MAX).expect("fits");
             assert!(
                 !overlaps(&outlines, &packed, samples, gutter),
                 "{samples} {gutter}"
@@ -350,7 +355,8 @@ mod tests {
             let filled = (cells * samples * samples) as f64 / (packed.side * packed.side) as f64;
             assert!(samples < 8 || gutter > 0 || filled > 0.55, "{filled}");
         }
-        assert_eq!(pack(&[], 8, 2).corner.len(), 0);
+        let none = pack(&[], 8, 2, usize::MAX).expect("fits");
+        assert_eq!(none.corner.len(), 0);
     }
 
     #[test]
@@ -370,8 +376,12 @@ mod tests {
                 }
             })
             .collect();
-        let packed = pack(&outlines, 16, 1);
+        let packed = pack(&outlines, 16, 1, usize::MAX).expect("fits");
         assert!(!overlaps(&outlines, &packed, 16, 1));
+        // Not into less than there is, but into what it takes.
+        let side = |most| pack(&outlines, 16, 1, most).map(|packed| packed.side);
+        assert_eq!(side(packed.side), Some(packed.side));
+        assert_eq!(side(packed.side - 1), None);
         let cells: usize = outlines.iter().map(|o| o.cells.len()).sum();
         let filled = (cells * 256) as f64 / (packed.side * packed.side) as f64;
         assert!(filled > 0.75, "{filled}");

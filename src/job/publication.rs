@@ -120,15 +120,23 @@ impl<'a> Publication<'a> {
         self.new = true;
         go_on()?;
         observer.stage("pages", component, components);
-        if config.pictures.enabled {
-            let _part = part!("pictures");
-            pictures::write(staging, &subfolder, atlas, config.pictures.size)?;
-        }
-        go_on()?;
-        if config.report.enabled {
-            let _part = part!("page");
-            report_page::write(staging, &subfolder, atlas, &provenance, &config.report)?;
-        }
+        let draw = || match config.pictures.enabled {
+            true => {
+                let _part = part!("pictures");
+                pictures::write(staging, &subfolder, atlas, config.pictures.size)
+            }
+            false => Ok(()),
+        };
+        let describe = || match config.report.enabled {
+            true => {
+                let _part = part!("page");
+                report_page::write(staging, &subfolder, atlas, &provenance, &config.report)
+            }
+            false => Ok(()),
+        };
+        let (drawn, described) = rayon::join(draw, describe);
+        drawn?;
+        described?;
         go_on()?;
         Ok(Ok(()))
     }

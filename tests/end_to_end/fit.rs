@@ -106,9 +106,9 @@ fn tolerances_are_kept() {
     };
     let (coarse, off, length) = cells_and_distance("coarse", "0.02");
     assert!(off <= 0.02, "{off}");
-    let (fine, off, _) = cells_and_distance("fine", "0.008");
+    let (fine, off, _) = cells_and_distance("fine", "0.003");
     assert!(
-        off <= 0.008 && fine > coarse,
+        off <= 0.003 && fine > coarse,
         "{off}, {fine} and {coarse} cells"
     );
     // A millimetre is a tenth of a source unit.
