@@ -7,17 +7,16 @@ use super::cage::{Cage, Kind};
 use super::error::SplineError;
 use super::evaluator::Evaluator;
 use super::gridded::Sample;
-use super::limit::{Limit, MOST_STEPS, Place};
+use super::limit::{Limit, Place};
 use super::measure::shape;
 use crate::flow::solve::SymmetricSolver;
+use crate::geometry::mesh::{norm, sub};
 use rayon::prelude::*;
 
 /// Weight of squares of second differences beside those of distances.
 const FAIR: f64 = 1e-6;
-/// Fits, one after each correction of places and one before. More of them follow noise.
-const ROUNDS: usize = 12;
-/// Rounds at the end in which samples are moved all the way.
-const LAST_ROUNDS: usize = 2;
+/// Fits, one after each correction of places and one before.
+const ROUNDS: usize = 6;
 /// Samples this many times as far off as the root mean square count twice …
 const FAR: f64 = 4.0;
 /// … and none more often than this.
@@ -176,8 +175,7 @@ impl<'a> Fitter<'a> {
         near.for_each(|(fairness, _)| *fairness *= FAIRER);
     }
 
-    /// Fits, and moves the places of samples to the nearest points, in turn. Each step alone goes a small part of the way, since places slide along the surface slowly; so places are those on a
-    /// surface that goes on past the last one by part of the last step (Y. Nesterov 1983). Samples that are far off count more in later rounds. Where a cell folds, samples stay where the map has them, and
+    /// Fits, and moves the places of samples to the nearest points, in turn; samples that are far off count more in later rounds. Where a cell folds, samples stay where the map has them, and
     /// where it still does it is made fairer.
     ///
     /// # Errors
@@ -186,30 +184,10 @@ impl<'a> Fitter<'a> {
         let given: Vec<Place> = samples.iter().map(Sample::place).collect();
         let mut folds = vec![0usize; self.cage.cells.len()];
         let mut control = self.solve(samples)?;
-        let mut before = control.clone();
-        let kinds = self.cage.kinds();
         for round in 1..=ROUNDS + MOST_SMOOTHINGS {
-            // The last places are on the surface itself; and beyond borders, creases and corners nothing holds it.
-            let part = match round < ROUNDS {
-                true => (round - 1) as f64 / (round + 2) as f64,
-                false => 0.0,
-            };
-            let past = |v: usize| {
-                let (c, b) = (control[v], before[v]);
-                let part = if kinds[v] == Kind::Smooth { part } else { 0.0 };
-                [0, 1, 2].map(|i| c[i] + part * (c[i] - b[i]))
-            };
-            let points: Vec<[f64; 3]> = (0..control.len()).map(past).collect();
-            let limit = Limit::new(self.cage, self.evaluator, &points);
+            let limit = Limit::new(self.cage, self.evaluator, &control);
             let mut moved = samples.to_vec();
-            // What a step leaves, the next round takes.
-            let steps = if round + LAST_ROUNDS > ROUNDS {
-                MOST_STEPS
-            } else {
-                1
-            };
-            let mut off = move_places(&limit, &mut moved, steps);
-            search_again(&limit, &mut moved, &given, &mut off);
+            move_places(&limit, &mut moved);
             let folded = match round {
                 1 => Vec::new(),
                 _ => shape(&limit, &moved).1,
@@ -222,7 +200,7 @@ impl<'a> Fitter<'a> {
             folded.iter().for_each(|&cell| folds[cell as usize] += 1);
             if round < ROUNDS {
                 samples.copy_from_slice(&moved);
-                weigh(samples, &off);
+                weigh(&limit, samples);
             }
             for (sample, place) in samples.iter_mut().zip(&given) {
                 if [place.cell, sample.cell]
@@ -234,51 +212,36 @@ impl<'a> Fitter<'a> {
             }
             let again = folded.into_iter().filter(|&cell| folds[cell as usize] > 1);
             self.smooth(&again.collect::<Vec<u32>>(), round > ROUNDS + 1);
-            before = std::mem::replace(&mut control, self.solve(samples)?);
+            control = self.solve(samples)?;
         }
         Ok(control)
     }
 }
 
 /// Weights of samples for the next fit: more where they are far off.
-fn weigh(samples: &mut [Sample], off: &[f64]) {
-    let large = far(samples, off);
+fn weigh(limit: &Limit<'_>, samples: &mut [Sample]) {
+    let off: Vec<f64> = samples
+        .par_iter()
+        .map(|s| norm(sub(limit.at(s.cell, s.at).point, s.point)))
+        .collect();
+    let area: f64 = samples.iter().map(|s| s.area).sum();
+    let squares: f64 = samples.iter().zip(&off).map(|(s, d)| s.area * d * d).sum();
+    let large = FAR * (squares / area).sqrt();
     if large > 0.0 {
-        for (sample, d) in samples.iter_mut().zip(off) {
+        for (sample, d) in samples.iter_mut().zip(&off) {
             sample.weight = (1.0 + (d / large).powi(2)).min(MOST_WEIGHT);
         }
     }
 }
 
-/// Searches from other places for samples that are far off: a search may end where only near places are farther.
-fn search_again(limit: &Limit<'_>, samples: &mut [Sample], given: &[Place], off: &mut [f64]) {
-    let large = far(samples, off);
-    let all = samples.par_iter_mut().zip(given).zip(off);
-    all.filter(|(_, off)| **off > large)
-        .for_each(|((sample, given), least)| {
-            let (place, off) = limit.nearest(sample.point, *given, MOST_STEPS);
-            if off < *least {
-                (sample.cell, sample.at, *least) = (place.cell, place.at, off);
-            }
-        });
-}
-
-/// What is far off: [`FAR`] times the root of the mean square of distances.
-fn far(samples: &[Sample], off: &[f64]) -> f64 {
-    let area: f64 = samples.iter().map(|s| s.area).sum();
-    let squares: f64 = samples.iter().zip(off).map(|(s, d)| s.area * d * d).sum();
-    FAR * (squares / area).sqrt()
-}
-
-/// Moves the places of samples to the nearest points of a surface, in so many steps at most; the distances that are left.
-fn move_places(limit: &Limit<'_>, samples: &mut [Sample], steps: usize) -> Vec<f64> {
-    let all = samples.par_iter_mut().with_min_len(RUN);
-    let moved = all.map(|sample| {
-        let (place, off) = limit.nearest(sample.point, sample.place(), steps);
-        (sample.cell, sample.at) = (place.cell, place.at);
-        off
+/// Moves the places of samples to the nearest points of a surface.
+pub fn move_places(limit: &Limit<'_>, samples: &mut [Sample]) {
+    samples.par_chunks_mut(RUN).for_each(|run| {
+        for sample in run {
+            let place = limit.nearest(sample.point, sample.place());
+            (sample.cell, sample.at) = (place.cell, place.at);
+        }
     });
-    moved.collect()
 }
 
 /// Second differences along both lines through a regular point, along a crease, and from the mean of the neighbours of an irregular point.

@@ -30,8 +30,8 @@ pub struct Place {
     pub at: [f64; 2],
 }
 
-/// Steps of a search for the nearest point, at most.
-pub const MOST_STEPS: usize = 4;
+/// Steps of one search for the nearest point, at most.
+const MOST_STEPS: usize = 4;
 /// A step, at most, cells.
 const MOST_STEP: f64 = 0.5;
 /// A search ends where steps are shorter, cells.
@@ -99,11 +99,11 @@ impl<'a> Limit<'a> {
         (jet.point, normal.unwrap_or([0.0; 3]))
     }
 
-    /// Moves a place nearer to being that of the nearest point of the surface, in so many steps at most, with the distance that is left; it does not cross creases.
-    pub fn nearest(&self, point: [f64; 3], mut place: Place, steps: usize) -> (Place, f64) {
+    /// Moves a place nearer to being that of the nearest point of the surface; it does not cross creases.
+    pub fn nearest(&self, point: [f64; 3], mut place: Place) -> Place {
         let mut jet = self.at(place.cell, place.at);
         let mut off = sub(point, jet.point);
-        for _ in 0..steps {
+        for _ in 0..MOST_STEPS {
             let [u, v] = jet.tangent;
             let (a, b, c) = (dot(u, u), dot(u, v), dot(v, v));
             let (x, y) = (dot(u, off), dot(v, off));
@@ -112,7 +112,7 @@ impl<'a> Limit<'a> {
             let mut step = match determinant > 1e-9 * a * c {
                 true => [(c * x - b * y) / determinant, (a * y - b * x) / determinant],
                 false if a + c > 0.0 => [x / (a + c), y / (a + c)],
-                false => break,
+                false => return place,
             };
             let longest = step[0].abs().max(step[1].abs());
             if longest < LEAST_STEP {
@@ -137,7 +137,7 @@ impl<'a> Limit<'a> {
                 break;
             }
         }
-        (place, norm(off))
+        place
     }
 }
 
