@@ -295,35 +295,22 @@ pub(crate) fn relax(map: &mut GridMap, unit: &Units) -> Result<Relaxed, GridErro
         equations.sum(|i| problem.derivatives(i, &place), |v| is_free[v]);
         let (step, slope) = equations.newton_step()?;
         let _part = part!("line search");
-        let most = BEFORE_FLAT * problem.longest(&place, &step);
-        let at = |length: f64| -> (Vec<[f64; 2]>, f64) {
-            let by = |(p, s): (&[f64; 2], &[f64; 2])| [p[0] + length * s[0], p[1] + length * s[1]];
-            let moved: Vec<[f64; 2]> = place.iter().zip(&step).map(by).collect();
-            let there = problem.energy(&moved);
-            (moved, there)
-        };
-        let mut length = most.min(1.0);
+        let mut length = (BEFORE_FLAT * problem.longest(&place, &step)).min(1.0);
         let mut found = None;
         for _ in 0..MOST_HALVINGS {
-            let (moved, there) = at(length);
+            let moved: Vec<[f64; 2]> = place
+                .iter()
+                .zip(&step)
+                .map(|(p, s)| [p[0] + length * s[0], p[1] + length * s[1]])
+                .collect();
+            let there = problem.energy(&moved);
             if there <= energy + SUFFICIENT * length * slope {
                 found = Some((moved, there));
                 break;
             }
             length *= 0.5;
         }
-        let Some((mut moved, mut there)) = found else {
-            break;
-        };
-        // Squeezed faces are worth longer steps: by Newton's, they get a third wider.
-        while length >= 1.0 && 2.0 * length <= most {
-            let farther = at(2.0 * length);
-            if farther.1 >= there {
-                break;
-            }
-            (moved, there) = farther;
-            length *= 2.0;
-        }
+        let Some((moved, there)) = found else { break };
         steps += 1;
         let gain = (energy - there) / energy;
         tracing::trace!(steps, energy = there / total, length, "symmetric Dirichlet");

@@ -59,9 +59,6 @@ pub fn build(
     Ok(atlases)
 }
 
-/// A grid whose lines lie elsewhere has more cells by this part.
-const ELSEWHERE: usize = 32;
-
 /// What became of one component.
 struct Part<'a> {
     index: usize,
@@ -70,8 +67,6 @@ struct Part<'a> {
     /// With its share of texels and pixels.
     config: &'a Config,
     atlas: Result<AffineAtlas, BuildError>,
-    /// Builds it with a grid whose lines lie elsewhere.
-    with_other_grid: &'a dyn Fn() -> Result<AffineAtlas, BuildError>,
     /// Builds it of flat patches, for this reason.
     without_grid: &'a dyn Fn(String) -> Result<AffineAtlas, BuildError>,
 }
@@ -115,11 +110,6 @@ fn each(
             let spare = spare.clone();
             pipeline(spare, &otherwise, &flat, Some(reason), observer, &enter)
         };
-        let with_other_grid = || {
-            let mut other = config.clone();
-            other.grid.cells += 1 + config.grid.cells / ELSEWHERE;
-            pipeline(spare.clone(), &requests, &other, None, observer, &enter)
-        };
         let is_sound = component.mesh.is_ok();
         let atlas = match pipeline(component, &requests, config, None, observer, &enter) {
             Err(BuildError::Cancelled) => Err(BuildError::Cancelled),
@@ -133,7 +123,6 @@ fn each(
             components,
             config,
             atlas,
-            with_other_grid: &with_other_grid,
             without_grid: &without_grid,
         })?;
     }
@@ -224,19 +213,6 @@ fn run_stages(
             }
             Ok(mut atlas) => {
                 let mut added = publication.add(index, components, &atlas, part.config)?;
-                // Slivers that its lines leave may be beyond float64: other lines leave others.
-                if added.is_err() && atlas.grid.is_some() {
-                    match (part.with_other_grid)() {
-                        Err(BuildError::Cancelled) => return Err(BuildError::Cancelled),
-                        Err(_) => {}
-                        Ok(other) => {
-                            let also = publication.add(index, components, &other, part.config)?;
-                            if also.is_ok() {
-                                (atlas, added) = (other, also);
-                            }
-                        }
-                    }
-                }
                 if let (Err(error), true) = (&added, atlas.grid.is_some()) {
                     match (part.without_grid)(error.to_string()) {
                         Err(BuildError::Cancelled) => return Err(BuildError::Cancelled),
