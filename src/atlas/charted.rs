@@ -7,6 +7,7 @@
 use crate::atlas::charts::{Chart, ChartFace, Charts, Transition};
 use crate::atlas::cut::{CutGraph, Segment, slit_copies};
 use crate::atlas::develop::Development;
+use crate::atlas::rounding;
 use crate::flow::prescription::Prescription;
 use crate::flow::ricci::FlatMetric;
 use crate::geometry::ids::{
@@ -15,6 +16,7 @@ use crate::geometry::ids::{
 use crate::geometry::mesh::Mesh;
 use crate::geometry::subdivision::Subdivision;
 use crate::geometry::triangle::area;
+use std::f64::consts::{PI, TAU};
 
 /// A surface with its flat metric, slit, developed and covered by charts.
 #[derive(Clone, Debug)]
@@ -52,9 +54,22 @@ pub(crate) fn lift(coarse: Charted, fine: &Subdivision) -> Charted {
         values.resize(vertices, 0.0);
         values.into()
     };
+    let mut length = flat_lengths(&mesh, &metric.length, fine);
+    // Old vertices have the angles that they had, new ones are flat.
+    let mut wanted = rounding::angle_sums(&mesh.connectivity, &metric.length).into_vec();
+    let c = &fine.connectivity;
+    wanted.extend(
+        c.vertices()
+            .skip(wanted.len())
+            .map(|v| match c.is_boundary_vertex(v) {
+                true => PI,
+                false => TAU,
+            }),
+    );
+    rounding::round(c, &mut length, &wanted.into());
     Charted {
         metric: FlatMetric {
-            length: flat_lengths(&mesh, &metric.length, fine),
+            length,
             log_scale: lift_log_scale(&mesh, &metric.log_scale, fine),
             curvature: extended(metric.curvature),
             ..metric

@@ -10,4 +10,5 @@ pub mod patch;
 pub mod patches;
 pub mod plane;
 pub(crate) mod raster;
+mod rounding;
 mod texels;

@@ -129,19 +129,6 @@ impl Cage {
         leaving
     }
 
-    /// Whether each point is on the border.
-    pub fn on_border(&self) -> Vec<bool> {
-        let mut is_on_border = vec![false; self.vertices];
-        for (corners, across) in self.cells.iter().zip(&self.across) {
-            for k in (0..4).filter(|&k| across[k].is_none()) {
-                for v in [corners[k], corners[(k + 1) & 3]] {
-                    is_on_border[v as usize] = true;
-                }
-            }
-        }
-        is_on_border
-    }
-
     /// Creases that end at each point.
     pub fn creases(&self) -> Vec<u8> {
         creases(self.vertices, &self.cells, &self.across, &self.crease)

@@ -60,9 +60,8 @@ impl Sample {
 /// An edge of cells is a crease where sharp edges cover this part of it.
 const COVERED: f64 = 0.9;
 /// Angles of creases, radians: 40° for the most part, 20° all along.
-pub const SHARP: f64 = 40.0 * std::f64::consts::PI / 180.0;
-/// See [`SHARP`].
-pub const BLUNT: f64 = SHARP / 2.0;
+const SHARP: f64 = 40.0 * std::f64::consts::PI / 180.0;
+const BLUNT: f64 = SHARP / 2.0;
 /// Creases that hang together have as many edges of cells, at least.
 const SHORTEST_NET: usize = 8;
 /// Creases that end inside have as many edges of cells, at least.
@@ -73,14 +72,8 @@ const PART: f64 = 0.75;
 const SMALL: f64 = 0.25;
 /// Parts along a side of a face, at most.
 const MOST_PARTS: f64 = 64.0;
-/// How far from an edge of cells one that lies along it may be, cells …
-pub const BESIDE: f64 = 0.1;
-/// … and how much it may turn from it: cosine of 30°.
-pub const ALONG: f64 = 0.866;
-/// Places of an edge of cells that are looked at.
-const PLACES: u32 = 16;
-/// How far an edge goes on, cells.
-const ROUNDING: f64 = 1e-9;
+/// How far from a line of the grid an edge that lies on it may be, cells.
+const ON_LINE: f64 = 1e-9;
 
 /// Cells by block, column and row.
 struct Cells(FxHashMap<(u32, [u32; 2]), u32>);
@@ -130,10 +123,80 @@ impl Gridded {
     /// # Errors
     /// Cells that make no surface.
     pub fn cage(&self) -> Result<Cage, SplineError> {
-        let covered = [BLUNT, SHARP].map(|angle| self.covered(angle));
-        creased(self.points.len(), &self.cells, |ends| {
-            [0, 1].map(|i| covered[i].get(&ends).copied().unwrap_or(0.0))
-        })
+        let [blunt, sharp] = [BLUNT, SHARP].map(|angle| self.covered(angle));
+        let cage = |is_crease: &dyn Fn([u32; 2]) -> bool, is_corner: Vec<bool>| {
+            let at = |(c, k): CellSide| {
+                let corners = self.cells[c as usize];
+                is_crease(sorted([
+                    corners[usize::from(k)],
+                    corners[usize::from((k + 1) & 3)],
+                ]))
+            };
+            Cage::new(self.points.len(), self.cells.clone(), at, is_corner)
+        };
+        let none = || vec![false; self.points.len()];
+        let part = |covered: &FxHashMap<[u32; 2], f64>, ends: [u32; 2]| {
+            covered.get(&ends).copied().unwrap_or(0.0)
+        };
+        let all = cage(&|ends| part(&blunt, ends) >= COVERED, none())?;
+        // Chains that are sharp for the most part, and long enough not to be noise if they end inside.
+        let steps = |chain: &[u32]| -> Vec<[u32; 2]> {
+            chain.windows(2).map(|w| sorted([w[0], w[1]])).collect()
+        };
+        let mut kept: Vec<Vec<u32>> = all.chains();
+        kept.retain(|chain| {
+            let steps = steps(chain);
+            2.0 * steps.iter().map(|&s| part(&sharp, s)).sum::<f64>() >= steps.len() as f64
+        });
+        let mut edges: FxHashSet<[u32; 2]> = kept.iter().flat_map(|chain| steps(chain)).collect();
+        let chains = cage(&|ends| edges.contains(&ends), none())?;
+        kept = chains.chains();
+        kept.retain(|chain| {
+            let ends = [chain[0], chain[chain.len() - 1]];
+            let goes_on = ends.iter().all(|&v| chains.is_corner[v as usize]) || ends[0] == ends[1];
+            goes_on || chain.len() > SHORTEST_CREASE
+        });
+        // And what hangs together is longer than around two cells.
+        let mut sets = UnionFind::new(self.points.len());
+        kept.iter().for_each(|chain| {
+            chain.windows(2).for_each(|w| {
+                sets.join(w[0] as usize, w[1] as usize);
+            })
+        });
+        let mut length = vec![0; self.points.len()];
+        for chain in &kept {
+            length[sets.find(chain[0] as usize)] += chain.len() - 1;
+        }
+        let border = chains.leaving();
+        let is_on_border = |v: u32| {
+            border[v as usize].is_some_and(|side| chains.turn_back(chains.star(side)[0]).is_none())
+        };
+        let touches: FxHashSet<usize> = kept
+            .iter()
+            .flatten()
+            .filter(|&&v| is_on_border(v))
+            .map(|&v| sets.find(v as usize))
+            .collect();
+        kept.retain(|chain| {
+            let set = sets.find(chain[0] as usize);
+            length[set] >= SHORTEST_NET || touches.contains(&set)
+        });
+        edges = kept.iter().flat_map(|chain| steps(chain)).collect();
+        // Where the limit surface would have no tangent plane, creases end an edge before.
+        loop {
+            let found = cage(&|ends| edges.contains(&ends), none())?;
+            let untidy = found.untidy_creases();
+            if untidy.is_empty() {
+                let is_corner = found.turns_around_cells();
+                return cage(&|ends| edges.contains(&ends), is_corner);
+            }
+            for side in untidy {
+                edges.remove(&sorted([
+                    found.tail(side),
+                    found.tail((side.0, side.1 + 1)),
+                ]));
+            }
+        }
     }
 
     /// Of edges of cells by their ends, the part of each that sharp edges of the surface cover.
@@ -141,7 +204,7 @@ impl Gridded {
         let cells = Cells::new(self);
         let normals: Vec<[f64; 3]> = self.faces.iter().map(|f| self.doubled(f)).collect();
         let mut beside: FxHashMap<[u32; 2], u32> = FxHashMap::default();
-        let mut places: FxHashMap<[u32; 2], u16> = FxHashMap::default();
+        let mut covered: FxHashMap<[u32; 2], f64> = FxHashMap::default();
         for (f, corners) in self.faces.iter().enumerate() {
             for k in 0..3 {
                 let [a, b] = [corners[k], corners[(k + 1) % 3]];
@@ -153,71 +216,44 @@ impl Gridded {
                 if norm(cross(m, n)).atan2(dot(m, n)) <= sharp {
                     continue;
                 }
-                let ends = [self.uv[f][k], self.uv[f][(k + 1) % 3]];
-                for (edge, marks) in self.along_edges(&cells, self.block[f], ends) {
-                    *places.entry(edge).or_default() |= marks;
+                let [p, q] = [self.uv[f][k], self.uv[f][(k + 1) % 3]];
+                if let Some((ends, part)) = self.on_line(&cells, self.block[f], p, q) {
+                    *covered.entry(ends).or_default() += part;
                 }
             }
         }
-        let part = |marks: u16| f64::from(marks.count_ones()) / f64::from(PLACES);
-        places.into_iter().map(|(e, m)| (e, part(m))).collect()
+        covered
     }
 
-    /// The edges of cells that a segment in a block lies along, and at which of [`PLACES`] places of each from its lesser end on.
-    fn along_edges(
+    /// The edge of cells that a segment in a block lies on, and how much of it that is.
+    fn on_line(
         &self,
         cells: &Cells,
         block: u32,
-        [p, q]: [[f64; 2]; 2],
-    ) -> Vec<([u32; 2], u16)> {
-        let d = [q[0] - p[0], q[1] - p[1]];
-        let length = d[0].hypot(d[1]);
-        let Some(along) = (0..2).find(|&i| d[i].abs() >= ALONG * length && length > 0.0) else {
-            return Vec::new();
+        p: [f64; 2],
+        q: [f64; 2],
+    ) -> Option<([u32; 2], f64)> {
+        let on = |i: usize| {
+            let line = p[i].round();
+            (p[i] - line).abs() <= ON_LINE && (q[i] - line).abs() <= ON_LINE
         };
-        let at = |t: f64| [0, 1].map(|i| p[i] + t * d[i]);
-        // Between lines of the grid.
-        let mut cuts = vec![0.0, 1.0];
-        for i in [0, 1] {
-            let (low, high) = (
-                p[i].min(q[i]).floor() as i64 + 1,
-                p[i].max(q[i]).ceil() as i64,
-            );
-            cuts.extend((low..high).map(|line| (line as f64 - p[i]) / d[i]));
-        }
-        cuts.sort_by(f64::total_cmp);
-        let mut found = Vec::new();
-        for w in cuts.windows(2) {
-            let middle = at((w[0] + w[1]) / 2.0);
-            let Some((cell, inside)) = cells.find(block, middle) else {
-                continue;
-            };
-            let ends = [w[0], w[1]].map(|t| {
-                let there = at(t);
-                [0, 1].map(|i| there[i] - middle[i] + inside[i])
-            });
-            let away = ends.map(|e| e[1 - along]);
-            let is_far = inside[1 - along] > 0.5;
-            let line = if is_far { 1.0 } else { 0.0 };
-            if away.iter().any(|x| (x - line).abs() > BESIDE) {
-                continue;
-            }
-            let edge = match (along, is_far) {
-                (0, false) => [0, 1],
-                (0, true) => [3, 2],
-                (_, false) => [0, 3],
-                (_, true) => [1, 2],
-            };
-            let [a, b] = edge.map(|k: usize| self.cells[cell as usize][k]);
-            let [x, y] = ends.map(|e| if a < b { e[along] } else { 1.0 - e[along] });
-            let (low, high) = (x.min(y) - ROUNDING, x.max(y) + ROUNDING);
-            let marks = (0..PLACES).filter(|&i| {
-                let place = (f64::from(i) + 0.5) / f64::from(PLACES);
-                low <= place && place <= high
-            });
-            found.push((sorted([a, b]), marks.fold(0, |sum, i| sum | 1 << i)));
-        }
-        found
+        let along = match (on(0), on(1)) {
+            (true, false) => 1,
+            (false, true) => 0,
+            _ => return None,
+        };
+        let middle = [0, 1].map(|i| (p[i] + q[i]) / 2.0);
+        let (cell, at) = cells.find(block, middle)?;
+        let corners = self.cells[cell as usize];
+        let far = at[1 - along] > 0.5;
+        let ends = match (along, far) {
+            (0, false) => [0, 1],
+            (0, true) => [3, 2],
+            (_, false) => [0, 3],
+            (_, true) => [1, 2],
+        };
+        let [a, b] = ends.map(|k: usize| corners[k]);
+        Some(([a.min(b), a.max(b)], (p[along] - q[along]).abs()))
     }
 
     /// Of the corners of faces, means of the normals of the faces around a vertex, by area; of those that lie within [`SHARP`] of the face.
@@ -311,85 +347,6 @@ impl Gridded {
             }
         }
         Ok(samples)
-    }
-}
-
-/// The control mesh of cells whose creases are edges that sharp edges of a surface lie along. `covered` says of an edge, by its ends with the lesser first, which part of it edges sharper than [`BLUNT`] and than [`SHARP`] cover:
-/// chains that the former cover, for the most part the latter too, and that are not short.
-///
-/// # Errors
-/// Cells that make no surface.
-pub fn creased(
-    vertices: usize,
-    cells: &[[u32; 4]],
-    covered: impl Fn([u32; 2]) -> [f64; 2],
-) -> Result<Cage, SplineError> {
-    let cage = |is_crease: &dyn Fn([u32; 2]) -> bool, is_corner: Vec<bool>| {
-        let at = |(c, k): CellSide| {
-            let corners = cells[c as usize];
-            is_crease(sorted([
-                corners[usize::from(k)],
-                corners[usize::from((k + 1) & 3)],
-            ]))
-        };
-        Cage::new(vertices, cells.to_vec(), at, is_corner)
-    };
-    let none = || vec![false; vertices];
-    let all = cage(&|ends| covered(ends)[0] >= COVERED, none())?;
-    // Chains that are sharp for the most part, and long enough not to be noise if they end inside.
-    let steps = |chain: &[u32]| -> Vec<[u32; 2]> {
-        chain.windows(2).map(|w| sorted([w[0], w[1]])).collect()
-    };
-    let mut kept: Vec<Vec<u32>> = all.chains();
-    kept.retain(|chain| {
-        let steps = steps(chain);
-        2.0 * steps.iter().map(|&s| covered(s)[1]).sum::<f64>() >= steps.len() as f64
-    });
-    let mut edges: FxHashSet<[u32; 2]> = kept.iter().flat_map(|chain| steps(chain)).collect();
-    let chains = cage(&|ends| edges.contains(&ends), none())?;
-    kept = chains.chains();
-    kept.retain(|chain| {
-        let ends = [chain[0], chain[chain.len() - 1]];
-        let goes_on = ends.iter().all(|&v| chains.is_corner[v as usize]) || ends[0] == ends[1];
-        goes_on || chain.len() > SHORTEST_CREASE
-    });
-    // And what hangs together is longer than around two cells.
-    let mut sets = UnionFind::new(vertices);
-    kept.iter().for_each(|chain| {
-        chain.windows(2).for_each(|w| {
-            sets.join(w[0] as usize, w[1] as usize);
-        })
-    });
-    let mut length = vec![0; vertices];
-    for chain in &kept {
-        length[sets.find(chain[0] as usize)] += chain.len() - 1;
-    }
-    let is_on_border = chains.on_border();
-    let touches: FxHashSet<usize> = kept
-        .iter()
-        .flatten()
-        .filter(|&&v| is_on_border[v as usize])
-        .map(|&v| sets.find(v as usize))
-        .collect();
-    kept.retain(|chain| {
-        let set = sets.find(chain[0] as usize);
-        length[set] >= SHORTEST_NET || touches.contains(&set)
-    });
-    edges = kept.iter().flat_map(|chain| steps(chain)).collect();
-    // Where the limit surface would have no tangent plane, creases end an edge before.
-    loop {
-        let found = cage(&|ends| edges.contains(&ends), none())?;
-        let untidy = found.untidy_creases();
-        if untidy.is_empty() {
-            let is_corner = found.turns_around_cells();
-            return cage(&|ends| edges.contains(&ends), is_corner);
-        }
-        for side in untidy {
-            edges.remove(&sorted([
-                found.tail(side),
-                found.tail((side.0, side.1 + 1)),
-            ]));
-        }
     }
 }
 

@@ -33,12 +33,11 @@ pub use error::SplineError;
 pub use gridded::Gridded;
 
 use crate::geometry::deviation::{Deviation, Sampling, Triangles, deviation};
-use crate::geometry::mesh::{bounding_box, norm, sub};
+use crate::geometry::mesh::{norm, sub};
 use cad::Faces;
 use cage::Cage;
 use evaluator::Evaluator;
 use fit::Fitter;
-use gridded::Sample;
 use limit::Limit;
 use measure::{Errors, Shape};
 use patches::Patches;
@@ -117,44 +116,34 @@ pub fn fit(gridded: &Gridded) -> Result<Spline, SplineError> {
     // About the middle, for digits.
     let middle: [f64; 3] = std::array::from_fn(|i| (low[i] + high[i]) / 2.0);
     let gridded = &gridded.moved(middle.map(|x| -x));
-    let source = Triangles {
-        positions: &gridded.positions,
-        faces: &gridded.faces,
-    };
-    let mut spline = fit_samples(gridded.cage()?, gridded.samples()?, source)?;
-    spline.diagonal = norm(sub(high, low));
-    for p in &mut spline.control {
-        *p = std::array::from_fn(|i| p[i] + middle[i]);
-    }
-    Ok(spline)
-}
-
-/// The same on any control mesh, for samples of `source` with places in its cells.
-///
-/// # Errors
-/// Equations without solution.
-pub fn fit_samples(
-    cage: Cage,
-    mut samples: Vec<Sample>,
-    source: Triangles<'_>,
-) -> Result<Spline, SplineError> {
+    let cage = gridded.cage()?;
+    let mut samples = gridded.samples()?;
     let evaluator = Evaluator::new(&cage);
-    let control = Fitter::new(&cage, &evaluator)?.fit(&mut samples)?;
+    let mut control = Fitter::new(&cage, &evaluator)?.fit(&mut samples)?;
     let limit = Limit::new(&cage, &evaluator, &control);
     let triangles = tessellate(&limit, parts(cage.cells.len()));
     let own = Triangles {
         positions: &triangles.points,
         faces: &triangles.faces,
     };
-    let errors = measure::errors(&limit, &samples);
-    let shape = measure::shape(&limit, &samples).0;
-    let (low, high) = bounding_box(source.positions);
+    let source = Triangles {
+        positions: &gridded.positions,
+        faces: &gridded.faces,
+    };
+    let (errors, shape) = (
+        measure::errors(&limit, &samples),
+        measure::shape(&limit, &samples).0,
+    );
+    let deviation = deviation(source, own, SAMPLING);
+    for p in &mut control {
+        *p = std::array::from_fn(|i| p[i] + middle[i]);
+    }
     Ok(Spline {
         cage,
         control,
         diagonal: norm(sub(high, low)),
         errors,
-        deviation: deviation(source, own, SAMPLING),
+        deviation,
         shape,
     })
 }

@@ -5,7 +5,7 @@
 use super::cage::{Cage, CellSide};
 use super::evaluator::CORNER;
 use super::limit::Limit;
-use crate::geometry::mesh::norm;
+use crate::geometry::mesh::{cross, dot, norm, sub};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
@@ -105,7 +105,17 @@ pub fn tessellate(limit: &Limit<'_>, parts: usize) -> Tessellation {
                     (j + 1) * row + i + 1,
                     (j + 1) * row + i,
                 ];
-                for corners in [[at[0], at[1], at[2]], [at[0], at[2], at[3]]] {
+                // Along the diagonal with which both triangles look more the way the surface does.
+                let [one, other] = [
+                    [[at[0], at[1], at[2]], [at[0], at[2], at[3]]],
+                    [[at[0], at[1], at[3]], [at[1], at[2], at[3]]],
+                ];
+                let jets = &jets[c as usize];
+                let triangles = match likeness(jets, &one) >= likeness(jets, &other) {
+                    true => one,
+                    false => other,
+                };
+                for corners in triangles {
                     out.faces.push(corners.map(|i| numbers[i][0]));
                     out.smooth_faces.push(corners.map(|i| numbers[i][1]));
                 }
@@ -120,6 +130,22 @@ pub fn tessellate(limit: &Limit<'_>, parts: usize) -> Tessellation {
         };
     }
     out
+}
+
+/// The least cosine between the normal of a triangle and the mean of its corners'.
+fn likeness(jets: &[([f64; 3], [f64; 3])], triangles: &[[usize; 3]; 2]) -> f64 {
+    let of = |corners: &[usize; 3]| {
+        let [p, q, r] = corners.map(|i| jets[i].0);
+        let own = cross(sub(q, p), sub(r, p));
+        let mean: [f64; 3] = std::array::from_fn(|x| corners.iter().map(|&i| jets[i].1[x]).sum());
+        let length = norm(own) * norm(mean);
+        if length > 0.0 {
+            dot(own, mean) / length
+        } else {
+            -1.0
+        }
+    };
+    of(&triangles[0]).min(of(&triangles[1]))
 }
 
 /// The name of a place, and what tells its normals on both sides of a crease apart.
