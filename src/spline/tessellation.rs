@@ -132,18 +132,14 @@ pub fn tessellate(limit: &Limit<'_>, parts: usize) -> Tessellation {
     out
 }
 
-/// The least cosine between the normal of a triangle and the mean of its corners'.
+/// The least cosine between the normal of a triangle and one of its corners'.
 fn likeness(jets: &[([f64; 3], [f64; 3])], triangles: &[[usize; 3]; 2]) -> f64 {
     let of = |corners: &[usize; 3]| {
         let [p, q, r] = corners.map(|i| jets[i].0);
         let own = cross(sub(q, p), sub(r, p));
-        let mean: [f64; 3] = std::array::from_fn(|x| corners.iter().map(|&i| jets[i].1[x]).sum());
-        let length = norm(own) * norm(mean);
-        if length > 0.0 {
-            dot(own, mean) / length
-        } else {
-            -1.0
-        }
+        let length = norm(own).max(f64::MIN_POSITIVE);
+        let cosines = corners.map(|i| dot(own, jets[i].1) / length);
+        cosines.into_iter().fold(1.0, f64::min)
     };
     of(&triangles[0]).min(of(&triangles[1]))
 }
