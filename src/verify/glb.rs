@@ -23,7 +23,26 @@ const PACKED_TOLERANCE: f64 = 1e-6;
 /// Islands whose boxes are compared pair by pair.
 const MOST_BOXES: usize = 4096;
 
-pub(super) fn check(folder: &Path, arrays: &Arrays, document: &Document, verdicts: &mut Verdicts) {
+/// What `surface.glb` is compared with.
+pub(super) struct Extent {
+    faces: usize,
+    /// Of the positions.
+    low: Point3,
+    high: Point3,
+}
+
+impl Extent {
+    pub(super) fn of(arrays: &Arrays) -> Self {
+        let (low, high) = bounds3(&arrays.positions);
+        Self {
+            faces: arrays.faces.len(),
+            low,
+            high,
+        }
+    }
+}
+
+pub(super) fn check(folder: &Path, extent: &Extent, document: &Document, verdicts: &mut Verdicts) {
     let path = folder.join("surface.glb");
     if !path.exists() && !document.is_generated() {
         return;
@@ -35,19 +54,19 @@ pub(super) fn check(folder: &Path, arrays: &Arrays, document: &Document, verdict
             return;
         }
     };
-    let drawn =
-        match parse(&bytes).and_then(|(root, binary)| draw(&root, binary, arrays.faces.len())) {
-            Ok(drawn) => drawn,
-            Err(error) => {
-                verdicts.note("surface.glb can be read", false, error);
-                return;
-            }
-        };
+    let drawn = match parse(&bytes).and_then(|(root, binary)| draw(&root, binary, extent.faces)) {
+        Ok(drawn) => drawn,
+        Err(error) => {
+            verdicts.note("surface.glb can be read", false, error);
+            return;
+        }
+    };
+    drop(bytes);
     verdicts.note("surface.glb can be read", true, "");
     verdicts.note(
         "surface.glb holds every face",
-        drawn.triangles == arrays.faces.len(),
-        format!("{} of {} triangles", drawn.triangles, arrays.faces.len()),
+        drawn.triangles == extent.faces,
+        format!("{} of {} triangles", drawn.triangles, extent.faces),
     );
     verdicts.note(
         "packed texture coordinates lie in the unit square",
@@ -68,7 +87,7 @@ pub(super) fn check(folder: &Path, arrays: &Arrays, document: &Document, verdict
             Overlap::Undecided => "too thin to be tested".to_owned(),
         },
     );
-    let (low, high) = bounds3(&arrays.positions);
+    let Extent { low, high, .. } = *extent;
     let size = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
     let reach = (0..3).fold(0.0, |m: f64, i| m.max(low[i].abs()).max(high[i].abs()));
     let off = (0..3).fold(0.0, |m: f64, i| {

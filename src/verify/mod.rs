@@ -314,33 +314,42 @@ pub fn verify_atlas(
     let Some(arrays) = arrays::read(folder, &document, &mut verdicts) else {
         return verdicts;
     };
-    let surface = surface::Surface::new(&arrays);
-    surface::check(&surface, &arrays, &document, &mut verdicts);
-    let (shapes, angles) = shapes::Shapes::new(&arrays);
-    let metric = metric::check(&surface, &arrays, &document, angles, options, &mut verdicts);
-    let slit = central::check(&surface, &arrays, &document, options, &mut verdicts);
-    transitions::check(&surface, &arrays, &document, &slit, &metric, &mut verdicts);
-    features::check(&surface, &arrays, &document, &slit, &mut verdicts);
-    charts::check(&surface, &arrays, &document, &slit, &mut verdicts);
+    check_arrays(folder, &arrays, &document, options, source, &mut verdicts);
+    let extent = glb::Extent::of(&arrays);
+    // `surface.glb` is as large as they are, and needs no more of them.
+    drop(arrays);
+    glb::check(folder, &extent, &document, &mut verdicts);
+    verdicts
+}
+
+/// Every check but those of `surface.glb`.
+fn check_arrays(
+    folder: &Path,
+    arrays: &arrays::Arrays,
+    document: &document::Document,
+    options: &VerifyOptions,
+    source: Option<&SourceSurface<'_>>,
+    verdicts: &mut Verdicts,
+) {
+    let surface = surface::Surface::new(arrays);
+    surface::check(&surface, arrays, document, verdicts);
+    let (shapes, angles) = shapes::Shapes::new(arrays);
+    let metric = metric::check(&surface, arrays, document, angles, options, verdicts);
+    let slit = central::check(&surface, arrays, document, options, verdicts);
+    transitions::check(&surface, arrays, document, &slit, &metric, verdicts);
+    features::check(&surface, arrays, document, &slit, verdicts);
+    charts::check(&surface, arrays, document, &slit, verdicts);
     if let Some(source) = source {
-        source::check(&arrays, &document, source, &mut verdicts);
+        source::check(arrays, document, source, verdicts);
     }
-    quality::check(&arrays, &document, &shapes, &mut verdicts);
+    quality::check(arrays, document, &shapes, verdicts);
     let groups = patches::check(
-        &surface,
-        &arrays,
-        &document,
-        &shapes,
-        options,
-        &slit,
-        &mut verdicts,
+        &surface, arrays, document, &shapes, options, &slit, verdicts,
     );
     if let Some(groups) = groups {
-        images::check(folder, &arrays, &document, &groups, &mut verdicts);
-        packed::check(folder, &document, &mut verdicts);
-        seams::check(&surface, &arrays, &document, &groups, &mut verdicts);
-        lattice::check(folder, &surface, &arrays, &document, &mut verdicts);
+        images::check(folder, arrays, document, &groups, verdicts);
+        packed::check(folder, document, verdicts);
+        seams::check(&surface, arrays, document, &groups, verdicts);
+        lattice::check(folder, &surface, arrays, document, verdicts);
     }
-    glb::check(folder, &arrays, &document, &mut verdicts);
-    verdicts
 }
