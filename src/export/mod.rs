@@ -46,13 +46,13 @@ use std::io;
 
 /// Writes all data files of one component into a staging folder: `atlas.json`, `atlas.npz`,
 /// `surface.glb` and the images. `subfolder` is `""` for an asset of one component, else
-/// [`folder::component_name`]. Gives the paths of the files inside the staging folder.
+/// [`folder::component_name`].
 pub fn write_component(
     staging: &Staging,
     subfolder: &str,
     atlas: &AffineAtlas,
     provenance: &Provenance,
-) -> Result<Vec<String>, ExportError> {
+) -> Result<Written, ExportError> {
     check_shapes(atlas)?;
     let document = atlas_json::describe(atlas, provenance)?;
     let inside = |name: &str| match subfolder {
@@ -76,8 +76,17 @@ pub fn write_component(
     let (arrays, others) = rayon::join(arrays, others);
     arrays?;
     files.push(name);
-    files.extend(others?);
-    Ok(files)
+    let (others, surface) = others?;
+    files.extend(others);
+    Ok(Written { files, surface })
+}
+
+/// What was written of a component.
+pub struct Written {
+    /// Paths inside the staging folder.
+    pub files: Vec<String>,
+    /// What `surface.glb` draws.
+    pub surface: glb::Surface,
 }
 
 /// Images, quads and the GLB.
@@ -87,7 +96,7 @@ fn write_others(
     atlas: &AffineAtlas,
     document: &atlas_json::Document,
     provenance: &Provenance,
-) -> Result<Vec<String>, ExportError> {
+) -> Result<(Vec<String>, glb::Surface), ExportError> {
     let part = part!("images");
     // Compression takes most of the time, and images do not depend on each other.
     let images = (atlas.images.par_iter().enumerate()).map(|(id, image)| {
@@ -125,10 +134,11 @@ fn write_others(
 
     let _part = part!("glb");
     let name = inside("surface.glb");
-    let bytes = glb::encode(atlas, document, provenance)?;
+    let surface = glb::Surface::of(atlas, provenance.appearance)?;
+    let bytes = glb::encode(&surface, document, provenance)?;
     staging.write(&name, &bytes)?;
     files.push(name);
-    Ok(files)
+    Ok((files, surface))
 }
 
 #[cfg(test)]
@@ -149,7 +159,9 @@ mod tests {
             let mut contents = Vec::new();
             for _ in 0..2 {
                 let staging = Staging::begin(&root, asset).unwrap();
-                let files = write_component(&staging, "", &atlas, &provenance).unwrap();
+                let files = write_component(&staging, "", &atlas, &provenance)
+                    .unwrap()
+                    .files;
                 assert_eq!(
                     files,
                     ["atlas.json", "atlas.npz", "images/0000.exr", "surface.glb"]

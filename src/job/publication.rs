@@ -6,12 +6,15 @@
 use super::error::{BuildError, Unverified};
 use super::precision::Precision;
 use crate::config::Config;
+use crate::export::atlas_json::FORMAT_VERSION;
 use crate::export::folder::{Staging, component_name};
+use crate::export::glb::whole::Whole;
 use crate::export::{self, ExportError, Provenance, pictures, report as report_page};
 use crate::observe::{Observer, part};
 use crate::product::AffineAtlas;
 use crate::read::SourceAsset;
-use crate::verify::{VerifyOptions, verify_atlas};
+use crate::verify::{Extent, VerifyOptions, verify_atlas_and_measure, verify_whole};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// What all components of an asset are written with.
@@ -28,6 +31,10 @@ pub(super) struct Publication<'a> {
     new: bool,
     /// Subfolders of components that have no atlas.
     missing: Vec<String>,
+    /// All that passed, where there are several, …
+    whole: Whole,
+    /// … and what a file of them is compared with.
+    extents: BTreeMap<usize, Extent>,
 }
 
 impl<'a> Publication<'a> {
@@ -50,6 +57,8 @@ impl<'a> Publication<'a> {
             staging: None,
             new: false,
             missing: Vec::new(),
+            whole: Whole::default(),
+            extents: BTreeMap::new(),
         }
     }
 
@@ -95,6 +104,7 @@ impl<'a> Publication<'a> {
             asset: self.id,
         };
         observer.stage("write", component, components);
+        let mut surface = None;
         match export::write_component(staging, &subfolder, atlas, &provenance) {
             // The fault is in this component alone.
             Err(error @ ExportError::NotFinite { .. }) => {
@@ -102,13 +112,17 @@ impl<'a> Publication<'a> {
                 return Ok(Err(error.into()));
             }
             written => {
-                written?;
+                let written = written?;
+                if components > 1 {
+                    surface = Some(written.surface);
+                }
             }
         }
         go_on()?;
         observer.stage("verify", component, components);
         let written = staging.path().join(&subfolder);
-        let verdicts = verify_atlas(&written, &VerifyOptions::default(), None);
+        let (verdicts, extent) =
+            verify_atlas_and_measure(&written, &VerifyOptions::default(), None);
         if let Some(unverified) = Unverified::of(&verdicts) {
             staging.withdraw(&subfolder)?;
             let precision = Precision::of(&verdicts, atlas, &self.asset.soup);
@@ -118,6 +132,10 @@ impl<'a> Publication<'a> {
             }));
         }
         self.new = true;
+        if let (Some(surface), Some(extent)) = (surface, extent) {
+            self.whole.add(component, surface, config.patches.padding);
+            self.extents.insert(component, extent);
+        }
         go_on()?;
         observer.stage("pages", component, components);
         let draw = || match config.pictures.enabled {
@@ -141,14 +159,27 @@ impl<'a> Publication<'a> {
         Ok(Ok(()))
     }
 
-    /// Puts the folder in place, where any atlas passed.
-    pub fn finish(self) -> Result<(), ExportError> {
+    /// Writes what all components have in common, and puts the folder in place, where any atlas passed.
+    pub fn finish(self) -> Result<(), BuildError> {
         let Some(staging) = self.staging.filter(|_| self.new) else {
             return Ok(());
         };
         for subfolder in &self.missing {
             staging.keep_previous(subfolder)?;
         }
-        staging.publish()
+        if !self.whole.is_empty() {
+            let appearance = &self.asset.soup.appearance;
+            let bytes = self.whole.encode(self.id, FORMAT_VERSION, appearance)?;
+            drop(self.whole);
+            if let Some(bytes) = bytes {
+                staging.write("surface.glb", &bytes)?;
+                drop(bytes);
+                let verdicts = verify_whole(staging.path(), &self.extents);
+                if let Some(unverified) = Unverified::of(&verdicts) {
+                    return Err(unverified.into());
+                }
+            }
+        }
+        Ok(staging.publish()?)
     }
 }

@@ -10,7 +10,7 @@ use super::patches::Overlap;
 use super::surface::UnionFind;
 use crate::read::bounded::read_bounded;
 use serde_json::Value;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
 
 /// Largest file that is read (bytes); the format's own limit.
@@ -24,7 +24,8 @@ const PACKED_TOLERANCE: f64 = 1e-6;
 const MOST_BOXES: usize = 4096;
 
 /// What `surface.glb` is compared with.
-pub(super) struct Extent {
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Extent {
     faces: usize,
     /// Of the positions.
     low: Point3,
@@ -40,22 +41,65 @@ impl Extent {
             high,
         }
     }
+
+    fn with(self, other: &Self) -> Self {
+        Self {
+            faces: self.faces + other.faces,
+            low: [0, 1, 2].map(|i| self.low[i].min(other.low[i])),
+            high: [0, 1, 2].map(|i| self.high[i].max(other.high[i])),
+        }
+    }
 }
 
 pub(super) fn check(folder: &Path, extent: &Extent, document: &Document, verdicts: &mut Verdicts) {
     let path = folder.join("surface.glb");
-    if !path.exists() && !document.is_generated() {
+    if path.exists() || document.is_generated() {
+        check_file(&path, |_| Ok(*extent), verdicts);
+    }
+}
+
+/// The file of all components of an asset, where there is one, against those that it says it holds.
+pub(super) fn check_whole(folder: &Path, parts: &BTreeMap<usize, Extent>, verdicts: &mut Verdicts) {
+    let path = folder.join("surface.glb");
+    if !path.exists() {
         return;
     }
-    let bytes = match read_bounded(&path, SIZE_LIMIT) {
+    let extent_of = |root: &Value| {
+        let listed = &root["meshes"][0]["extras"]["affineAtlas"]["components"];
+        let listed = listed.as_array().ok_or("names no components")?;
+        let mut whole: Option<Extent> = None;
+        let mut seen = BTreeSet::new();
+        for entry in listed {
+            let component = index(&entry["component"]).ok_or("names a component by no number")?;
+            let part = parts.get(&component).filter(|_| seen.insert(component));
+            let part = part.ok_or_else(|| {
+                format!("names component {component}, of which there is no sound atlas")
+            })?;
+            whole = Some(whole.map_or(*part, |whole| whole.with(part)));
+        }
+        whole.ok_or_else(|| "names no components".to_owned())
+    };
+    check_file(&path, extent_of, verdicts);
+}
+
+fn check_file(
+    path: &Path,
+    extent_of: impl FnOnce(&Value) -> Result<Extent, String>,
+    verdicts: &mut Verdicts,
+) {
+    let bytes = match read_bounded(path, SIZE_LIMIT) {
         Ok(bytes) => bytes,
         Err(error) => {
             verdicts.note("surface.glb can be read", false, error);
             return;
         }
     };
-    let drawn = match parse(&bytes).and_then(|(root, binary)| draw(&root, binary, extent.faces)) {
-        Ok(drawn) => drawn,
+    let read = parse(&bytes).and_then(|(root, binary)| {
+        let extent = extent_of(&root)?;
+        Ok((draw(&root, binary, extent.faces)?, extent))
+    });
+    let (drawn, extent) = match read {
+        Ok(read) => read,
         Err(error) => {
             verdicts.note("surface.glb can be read", false, error);
             return;
@@ -87,7 +131,7 @@ pub(super) fn check(folder: &Path, extent: &Extent, document: &Document, verdict
             Overlap::Undecided => "too thin to be tested".to_owned(),
         },
     );
-    let Extent { low, high, .. } = *extent;
+    let Extent { low, high, .. } = extent;
     let size = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
     let reach = (0..3).fold(0.0, |m: f64, i| m.max(low[i].abs()).max(high[i].abs()));
     let off = (0..3).fold(0.0, |m: f64, i| {

@@ -39,9 +39,11 @@ mod transitions;
 
 use crate::read::bounded::{JSON_LIMIT, is_inside, read_bounded};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+pub(crate) use glb::Extent;
 pub use source::SourceSurface;
 
 /// Options of [`verify`].
@@ -202,10 +204,13 @@ fn verify_asset(
             path: folder.to_owned(),
         });
     }
+    let mut parts = BTreeMap::new();
     for name in components {
-        let number = name.trim_start_matches("component-").parse().ok();
+        let number: Option<u64> = name.trim_start_matches("component-").parse().ok();
         let path = folder.join(&name);
-        let part = verify_atlas(&path, options, source);
+        let (part, extent) = verify_atlas_and_measure(&path, options, source);
+        let place = number.and_then(|n| usize::try_from(n).ok());
+        parts.extend(place.zip(extent));
         verdicts.append(&name, part);
         let stated = document::component(&path);
         verdicts.note(
@@ -216,6 +221,9 @@ fn verify_asset(
                 None => "atlas.json states none".to_owned(),
             },
         );
+    }
+    if !parts.is_empty() {
+        glb::check_whole(folder, &parts, &mut verdicts);
     }
     Ok(verdicts)
 }
@@ -307,19 +315,35 @@ pub fn verify_atlas(
     options: &VerifyOptions,
     source: Option<&SourceSurface<'_>>,
 ) -> Verdicts {
+    verify_atlas_and_measure(folder, options, source).0
+}
+
+/// The `surface.glb` of all components of an asset, by number.
+pub(crate) fn verify_whole(folder: &Path, parts: &BTreeMap<usize, Extent>) -> Verdicts {
+    let mut verdicts = Verdicts::default();
+    glb::check_whole(folder, parts, &mut verdicts);
+    verdicts
+}
+
+/// As [`verify_atlas`], with what a file of all components is compared with where the arrays can be read.
+pub(crate) fn verify_atlas_and_measure(
+    folder: &Path,
+    options: &VerifyOptions,
+    source: Option<&SourceSurface<'_>>,
+) -> (Verdicts, Option<Extent>) {
     let mut verdicts = Verdicts::default();
     let Some(document) = document::read(folder, &mut verdicts) else {
-        return verdicts;
+        return (verdicts, None);
     };
     let Some(arrays) = arrays::read(folder, &document, &mut verdicts) else {
-        return verdicts;
+        return (verdicts, None);
     };
     check_arrays(folder, &arrays, &document, options, source, &mut verdicts);
-    let extent = glb::Extent::of(&arrays);
+    let extent = Extent::of(&arrays);
     // `surface.glb` is as large as they are, and needs no more of them.
     drop(arrays);
     glb::check(folder, &extent, &document, &mut verdicts);
-    verdicts
+    (verdicts, Some(extent))
 }
 
 /// Every check but those of `surface.glb`.

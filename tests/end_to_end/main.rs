@@ -26,6 +26,7 @@ mod replacing;
 mod survey;
 mod texture;
 mod units;
+mod whole;
 
 /// Files of the run as a whole, beside the folders of assets.
 const OF_THE_RUN: [&str; 6] = [

@@ -53,6 +53,7 @@ use crate::geometry::mesh::Mesh;
 use demand::Sums;
 use divide::Divider;
 pub use given::charts_of;
+pub(crate) use packing::pack;
 pub use params::{PatchError, PatchParams};
 use places::{Placed, images, with_images};
 use rayon::prelude::*;

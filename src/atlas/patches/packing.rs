@@ -2,7 +2,7 @@
 
 /// Lower left corners of rectangles (width, height) that overlap nowhere, and the side of a square that
 /// holds them all. Whole numbers, so the result is the same everywhere.
-pub(super) fn pack(sizes: &[[usize; 2]]) -> (Vec<[usize; 2]>, usize) {
+pub(crate) fn pack(sizes: &[[usize; 2]]) -> (Vec<[usize; 2]>, usize) {
     let order = highest_first(sizes);
     let widest = sizes.iter().map(|s| s[0]).max().unwrap_or(1);
     let area: usize = sizes.iter().map(|s| s[0] * s[1]).sum();

@@ -6,7 +6,7 @@ use gltf::json::accessor::{ComponentType, GenericComponentType, Type};
 use gltf::json::buffer::{Target, View};
 use gltf::json::mesh::{Mode, Semantic};
 use gltf::json::validation::{Checked, USize64};
-use gltf::json::{Accessor, Buffer, Index, Root, Value};
+use gltf::json::{Accessor, Buffer, Index, Mesh, Node, Root, Scene, Value};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -140,6 +140,27 @@ impl Builder {
         let view = self.view(&bytes, Some(Target::ElementArrayBuffer));
         let accessor = self.accessor(view, indices.len(), component, Type::Scalar);
         self.root.push(accessor)
+    }
+
+    /// A scene of one mesh, moved.
+    pub(super) fn scene(&mut self, mesh: Mesh, origin: [f32; 3]) {
+        let name = mesh.name.clone();
+        let mesh = self.root.push(mesh);
+        let node = self.root.push(Node {
+            mesh: Some(mesh),
+            name,
+            translation: (origin != [0.0; 3]).then_some(origin),
+            ..Node::default()
+        });
+        let scene = self.root.push(Scene {
+            extensions: None,
+            extras: None,
+            name: None,
+            nodes: vec![node],
+        });
+        self.root.scene = Some(scene);
+        self.root.asset.generator =
+            Some(concat!("affine-atlas ", env!("CARGO_PKG_VERSION")).into());
     }
 
     /// Header, JSON chunk padded with spaces, binary chunk padded with zeros.

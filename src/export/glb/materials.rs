@@ -1,7 +1,7 @@
 //! Materials, textures and images of `surface.glb`: those that the component uses, each once.
 
 use super::builder::Builder;
-use super::vertices::Sets;
+use super::vertices::SetNumbers;
 use crate::geometry::ids::NONE;
 use crate::geometry::mesh::{Appearance, Material, TextureUse};
 use gltf::json::image::MimeType;
@@ -17,27 +17,19 @@ use std::collections::BTreeMap;
 /// Writes materials in the order in which they are asked for.
 pub(super) struct Writer<'a> {
     appearance: &'a Appearance,
-    sets: &'a Sets<'a>,
+    sets: &'a SetNumbers,
     textures: BTreeMap<usize, Index<Texture>>,
     images: BTreeMap<usize, Index<Image>>,
 }
 
 impl<'a> Writer<'a> {
-    pub(super) fn new(appearance: &'a Appearance, sets: &'a Sets<'a>) -> Self {
+    pub(super) fn new(appearance: &'a Appearance, sets: &'a SetNumbers) -> Self {
         Self {
             appearance,
             sets,
             textures: BTreeMap::new(),
             images: BTreeMap::new(),
         }
-    }
-
-    /// How many texture-coordinate sets of the source a primitive must have for a material's textures.
-    pub(super) fn texture_coordinate_sets(&self, id: u32) -> usize {
-        let uses = self.appearance.materials.get(id as usize).map(textures_of);
-        let sets = uses.into_iter().flatten().flatten();
-        let places = sets.filter_map(|used| self.sets.shifted(used.tex_coord));
-        places.max().unwrap_or(0) as usize
     }
 
     /// Adds the material of a number, or the default one.
@@ -165,6 +157,18 @@ impl<'a> Writer<'a> {
         self.images.insert(id, index);
         Some(index)
     }
+}
+
+/// How many texture-coordinate sets of the source a primitive must have for a material's textures.
+pub(super) fn texture_coordinate_sets(
+    appearance: &Appearance,
+    id: u32,
+    sets: &SetNumbers,
+) -> usize {
+    let uses = appearance.materials.get(id as usize).map(textures_of);
+    let used = uses.into_iter().flatten().flatten();
+    let places = used.filter_map(|used| sets.shifted(used.tex_coord));
+    places.max().unwrap_or(0) as usize
 }
 
 fn textures_of(m: &Material) -> [Option<&TextureUse>; 5] {

@@ -16,17 +16,20 @@ pub mod plain;
 pub mod region;
 pub mod textured;
 mod vertices;
+pub mod whole;
 
 use crate::atlas::patches::Domain;
 use crate::export::atlas_json::{self, Document, Patch};
 use crate::export::{ExportError, Provenance};
 use crate::geometry::ids::{FaceId, NONE};
+use crate::geometry::mesh::{Appearance, cross, norm, sub};
 use crate::product::AffineAtlas;
 use builder::Builder;
+use gltf::json::Mesh;
 use gltf::json::extras::RawValue;
-use gltf::json::{Mesh, Node, Scene};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use vertices::{Primitive, SetNumbers};
 
 /// What `meshes[0].extras` holds, under the key `affineAtlas`.
 #[derive(Debug, Serialize)]
@@ -52,55 +55,96 @@ struct PatchExtras<'a> {
     patch_to_chart: Option<atlas_json::Similarity>,
 }
 
-/// The bytes of the file. Expects [`crate::export::check_shapes`] to hold.
+/// The vertices of a component, split for the format.
+pub struct Surface {
+    /// Subtracted from positions.
+    origin: [f32; 3],
+    /// The source's texture-coordinate sets.
+    sets: SetNumbers,
+    /// Those of each material.
+    primitives: Vec<(u32, Primitive)>,
+    /// What a side of the packed square is on the surface, source units.
+    side: f64,
+    /// The same of a texel.
+    texel: f64,
+}
+
+impl Surface {
+    /// Splits the vertices of an atlas. Expects [`crate::export::check_shapes`] to hold.
+    pub fn of(atlas: &AffineAtlas, appearance: &Appearance) -> Result<Self, ExportError> {
+        let mut groups: BTreeMap<u32, Vec<FaceId>> = BTreeMap::new();
+        for (f, &material) in atlas.mesh.face_material.enumerate() {
+            let known = (material as usize) < appearance.materials.len();
+            let key = if known { material } else { NONE };
+            groups.entry(key).or_default().push(f);
+        }
+        let sets = vertices::Sets::of(&atlas.mesh.attributes);
+        let numbers = sets.numbers();
+        let mut splitter = vertices::Splitter::new(atlas, &sets)?;
+        let mut primitives = Vec::new();
+        for (&id, faces) in &groups {
+            let least_sets = materials::texture_coordinate_sets(appearance, id, &numbers);
+            primitives.push((id, splitter.primitive(faces, least_sets)?));
+        }
+        let (side, texel) = lengths(atlas);
+        Ok(Self {
+            origin: splitter.origin(),
+            sets: numbers,
+            primitives,
+            side,
+            texel,
+        })
+    }
+}
+
+/// What a side of the packed square and a texel are on the surface on average, source units; 1 where that is no length.
+fn lengths(atlas: &AffineAtlas) -> (f64, f64) {
+    let (mesh, layout) = (&atlas.mesh, &atlas.patches);
+    // Areas in units of the surface's size, so that nothing underflows.
+    let size = mesh.diagonal();
+    let (mut space, mut packed) = (0.0, 0.0);
+    for f in mesh.connectivity.faces() {
+        let [a, b, c] = mesh.face_positions(f);
+        let side = |p| sub(p, a).map(|x| x / size);
+        space += norm(cross(side(b), side(c)));
+        let [a, b, c] = layout.uv[f];
+        let scale = layout.patches[layout.face_patch[f].index()].packed_scale;
+        let [b, c] = [b, c].map(|p| [0, 1].map(|i| scale * (p[i] - a[i])));
+        packed += (b[0] * c[1] - b[1] * c[0]).abs();
+    }
+    let side = size * (space / packed).sqrt();
+    let texels = layout.patches.iter().map(|patch| {
+        let [[a, _, _], [b, _, _]] = patch.texel_to_patch;
+        patch.packed_scale * a.hypot(b)
+    });
+    let texel = side * texels.fold(0.0, f64::max);
+    match side.is_normal() && texel.is_normal() {
+        true => (side, texel),
+        false => (1.0, 0.0),
+    }
+}
+
+/// The bytes of the file of one component.
 pub fn encode(
-    atlas: &AffineAtlas,
+    surface: &Surface,
     document: &Document,
     provenance: &Provenance,
 ) -> Result<Vec<u8>, ExportError> {
-    let appearance = provenance.appearance;
-    let mut groups: BTreeMap<u32, Vec<FaceId>> = BTreeMap::new();
-    for (f, &material) in atlas.mesh.face_material.enumerate() {
-        let known = (material as usize) < appearance.materials.len();
-        let key = if known { material } else { NONE };
-        groups.entry(key).or_default().push(f);
-    }
     let mut builder = Builder::default();
-    let sets = vertices::Sets::of(&atlas.mesh.attributes);
-    let mut splitter = vertices::Splitter::new(atlas, &sets)?;
-    let mut materials = materials::Writer::new(appearance, &sets);
+    let mut materials = materials::Writer::new(provenance.appearance, &surface.sets);
     let mut primitives = Vec::new();
-    for (&id, faces) in &groups {
-        let least_sets = materials.texture_coordinate_sets(id);
-        let primitive = splitter.primitive(faces, least_sets)?;
-        let material = materials.write(id, &mut builder);
-        primitives.push(builder.primitive(&primitive, material));
+    for (id, primitive) in &surface.primitives {
+        let material = materials.write(*id, &mut builder);
+        primitives.push(builder.primitive(primitive, material));
     }
-    let mesh = builder.root.push(Mesh {
+    let mesh = Mesh {
         extensions: None,
         extras: Some(extras(document)),
         name: Some(provenance.asset.into()),
         primitives,
         weights: None,
-    });
-    let origin = splitter.origin();
-    let node = builder.root.push(Node {
-        mesh: Some(mesh),
-        name: Some(provenance.asset.into()),
-        translation: (origin != [0.0; 3]).then_some(origin),
-        ..Node::default()
-    });
-    let scene = builder.root.push(Scene {
-        extensions: None,
-        extras: None,
-        name: None,
-        nodes: vec![node],
-    });
-    builder.root.scene = Some(scene);
-    builder.root.asset.generator = Some(format!(
-        "{} {}",
-        document.generator.name, document.generator.version
-    ));
+    };
+    builder.scene(mesh, surface.origin);
     builder.finish()
 }
 

@@ -17,7 +17,8 @@ struct Read {
 fn encoded(atlas: &AffineAtlas, appearance: &Appearance) -> Vec<u8> {
     let provenance = sample::provenance(appearance);
     let document = atlas_json::describe(atlas, &provenance).unwrap();
-    encode(atlas, &document, &provenance).unwrap()
+    let surface = Surface::of(atlas, appearance).unwrap();
+    encode(&surface, &document, &provenance).unwrap()
 }
 
 fn read(atlas: &AffineAtlas, appearance: &Appearance) -> Read {

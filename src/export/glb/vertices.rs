@@ -13,6 +13,7 @@ pub(super) const PACKED_TOLERANCE: f64 = 1e-6;
 const TANGENT_TOLERANCE: f64 = 1e-2;
 
 /// Vertices and triangles of one material.
+#[derive(Clone, Debug)]
 pub(super) struct Primitive {
     pub(super) indices: Vec<u32>,
     pub(super) position: Vec<[f32; 3]>,
@@ -56,9 +57,19 @@ impl<'a> Sets<'a> {
         sets
     }
 
+    pub(super) fn numbers(&self) -> SetNumbers {
+        SetNumbers(self.tex_coords.iter().map(|&(n, _)| n).collect())
+    }
+}
+
+/// The source's numbers of its texture-coordinate sets, in their order.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct SetNumbers(Vec<u32>);
+
+impl SetNumbers {
     /// Where the source's texture-coordinate set goes: one up, closed up where the source leaves sets out.
     pub(super) fn shifted(&self, source_set: u32) -> Option<u32> {
-        let place = self.tex_coords.iter().position(|&(n, _)| n == source_set);
+        let place = self.0.iter().position(|&n| n == source_set);
         place.map(|i| i as u32 + 1)
     }
 }
@@ -296,7 +307,7 @@ struct Row {
 }
 
 /// The number of the next output vertex. The greatest number is reserved by the format.
-fn next_index(vertices: usize) -> Result<u32, ExportError> {
+pub(super) fn next_index(vertices: usize) -> Result<u32, ExportError> {
     let index = u32::try_from(vertices).ok().filter(|&n| n < NONE);
     index.ok_or(ExportError::Inconsistent {
         what: "vertices of a glTF primitive",
