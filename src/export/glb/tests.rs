@@ -325,10 +325,8 @@ fn bounds_and_index_types_follow_the_rules() {
 fn coordinates_beyond_single_precision_are_refused() {
     let mut atlas = sample::torus(4, 3);
     atlas.mesh.positions.as_mut_slice()[5][1] = 1e39;
-    let appearance = Appearance::default();
-    let provenance = sample::provenance(&appearance);
-    let document = atlas_json::describe(&atlas, &provenance).unwrap();
-    let error = encode(&atlas, &document, &provenance).unwrap_err();
+    let error = Surface::of(&atlas, &Appearance::default());
+    let error = error.err().expect("an error");
     assert!(
         matches!(error, ExportError::TooLarge { vertex: 5, .. }),
         "{error}"
