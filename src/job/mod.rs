@@ -212,14 +212,14 @@ fn run_stages(
                 Err(error)
             }
             Ok(mut atlas) => {
-                let mut added = publication.add(index, components, &atlas, part.config)?;
+                let mut added = publication.add(index, components, &mut atlas, part.config)?;
                 if let (Err(error), true) = (&added, atlas.grid.is_some()) {
                     match (part.without_grid)(error.to_string()) {
                         Err(BuildError::Cancelled) => return Err(BuildError::Cancelled),
                         Err(error) => added = Err(error),
                         Ok(flat) => {
                             atlas = flat;
-                            added = publication.add(index, components, &atlas, part.config)?;
+                            added = publication.add(index, components, &mut atlas, part.config)?;
                         }
                     }
                 }

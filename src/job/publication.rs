@@ -75,12 +75,13 @@ impl<'a> Publication<'a> {
         self.missing.push(Self::subfolder(component, components));
     }
 
-    /// Writes the atlas of a component, checks it and draws it. The inner error says why it is not published.
+    /// Writes the atlas of a component, checks it and draws it; its images, which nothing else asks for, are gone then. The inner error says why it is
+    /// not published.
     pub fn add(
         &mut self,
         component: usize,
         components: usize,
-        atlas: &AffineAtlas,
+        atlas: &mut AffineAtlas,
         config: &Config,
     ) -> Result<Result<(), BuildError>, ExportError> {
         let observer = self.observer;
@@ -118,6 +119,9 @@ impl<'a> Publication<'a> {
                 }
             }
         }
+        // They are the largest part, and are read back one by one.
+        atlas.images = Vec::new();
+        let atlas = &*atlas;
         go_on()?;
         observer.stage("verify", component, components);
         let written = staging.path().join(&subfolder);
