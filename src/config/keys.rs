@@ -245,7 +245,7 @@ pub const KEYS: &[Key] = &[
             max: 1_000_000,
         },
         "components",
-        "256",
+        "10000",
     ),
     key(
         "cones.strategy",
