@@ -245,7 +245,7 @@ pub const KEYS: &[Key] = &[
             max: 1_000_000,
         },
         "components",
-        "10000",
+        "1000",
     ),
     key(
         "cones.strategy",

@@ -63,7 +63,7 @@ impl Default for RepairParams {
             weld: true,
             weld_tolerance: 0.0,
             strict: false,
-            max_components: 10_000,
+            max_components: 1000,
         }
     }
 }
