@@ -36,10 +36,15 @@ impl Layers {
         merge(&mut merged, own);
         // Each layer was accepted alone and a key is replaced as a whole, so this can only fail where
         // a stage relates several of its keys.
-        let config: Result<Config, toml::de::Error> = toml::Value::Table(merged).try_into();
         let nowhere = Source::new("configuration", "");
         let source = self.last.as_ref().unwrap_or(&nowhere);
-        config.map_err(|error| refused(source, &error))?.resolved()
+        Config::of_table(&merged)
+            .map_err(|reason| ConfigError::Refused {
+                key: "configuration".to_owned(),
+                at: source.at(0..0),
+                reason,
+            })?
+            .resolved()
     }
 }
 

@@ -125,7 +125,8 @@ impl Config {
     #[must_use]
     pub fn flat(&self) -> BTreeMap<String, serde_json::Value> {
         let mut flat = BTreeMap::new();
-        let mut pending = vec![(String::new(), serde_json::json!(self.canonical()))];
+        let value = serde_json::from_slice(&self.canonical_json()).expect("what was written as JSON");
+        let mut pending = vec![(String::new(), value)];
         while let Some((path, value)) = pending.pop() {
             match value {
                 serde_json::Value::Object(members) => {
@@ -148,9 +149,17 @@ impl Config {
     /// neither comments, nor the order of keys, nor keys that repeat a default change it.
     #[must_use]
     pub fn hash(&self) -> String {
-        let text = serde_json::to_vec(&self.canonical())
-            .expect("the canonical configuration holds numbers, words and lists only");
-        blake3::hash(&text).to_hex().to_string()
+        blake3::hash(&self.canonical_json()).to_hex().to_string()
+    }
+
+    /// The configuration of a table, or what a stage does not take. Through its text: a second reader of all stages would cost as much to compile.
+    fn of_table(table: &toml::Table) -> Result<Self, String> {
+        toml::from_str(&table.to_string()).map_err(|error| error.message().to_owned())
+    }
+
+    fn canonical_json(&self) -> Vec<u8> {
+        serde_json::to_vec(&self.canonical())
+            .expect("the canonical configuration holds numbers, words and lists only")
     }
 }
 

@@ -97,12 +97,10 @@ pub(super) fn take(
                 });
             }
         };
-        let alone: Result<Config, toml::de::Error> =
-            toml::Value::Table(settings.clone()).try_into();
-        alone.map_err(|error| ConfigError::Refused {
+        Config::of_table(&settings).map_err(|reason| ConfigError::Refused {
             at: at.clone(),
             key: "asset".to_owned(),
-            reason: error.message().to_owned(),
+            reason,
         })?;
         overrides.push(Override {
             pattern,

@@ -521,7 +521,17 @@ mod tests {
     #[test]
     #[cfg_attr(not(corpus), ignore = "needs AFFINE_ATLAS_CORPUS")]
     fn corpus_is_fitted() {
-        for shape in shapes::corpus() {
+        are_fitted(shapes::corpus());
+    }
+
+    #[test]
+    #[ignore = "long"]
+    fn large_models_are_fitted() {
+        are_fitted(shapes::large_models());
+    }
+
+    fn are_fitted(models: Vec<shapes::Shape>) {
+        for shape in models {
             let packing = fit(&shape.connectivity, &shape.length).unwrap();
             println!("{:22} {:?}", shape.name, packing.fit);
             assert!(packing.fit.mean_length_error < 0.3);

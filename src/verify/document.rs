@@ -296,21 +296,24 @@ pub(super) struct Flags {
     pub seamless: bool,
 }
 
-fn parse(folder: &Path) -> Result<Value, String> {
-    let path = folder.join("atlas.json");
-    let bytes = read_bounded(&path, JSON_LIMIT).map_err(|error| error.to_string())?;
-    serde_json::from_slice(&bytes).map_err(|error| error.to_string())
+fn bytes(folder: &Path) -> Result<Vec<u8>, String> {
+    read_bounded(&folder.join("atlas.json"), JSON_LIMIT).map_err(|error| error.to_string())
+}
+
+fn parse(bytes: &[u8]) -> Result<Value, String> {
+    serde_json::from_slice(bytes).map_err(|error| error.to_string())
 }
 
 /// The number of the component that an atlas says it is.
 pub(super) fn component(folder: &Path) -> Option<u64> {
-    parse(folder).ok()?["source"]["component"].as_u64()
+    parse(&bytes(folder).ok()?).ok()?["source"]["component"].as_u64()
 }
 
 /// Reads `atlas.json`; `None` where it cannot be used, after a failed check that says why.
 pub(super) fn read(folder: &Path, verdicts: &mut Verdicts) -> Option<Document> {
-    let value = match parse(folder) {
-        Ok(value) => value,
+    let read = bytes(folder).and_then(|bytes| Ok((parse(&bytes)?, bytes)));
+    let (value, bytes) = match read {
+        Ok(read) => read,
         Err(error) => {
             verdicts.note("atlas.json can be read", false, error);
             return None;
@@ -330,7 +333,7 @@ pub(super) fn read(folder: &Path, verdicts: &mut Verdicts) -> Option<Document> {
     if !complete {
         return None;
     }
-    let document: Document = match serde_json::from_value(value) {
+    let document: Document = match serde_json::from_slice(&bytes) {
         Ok(document) => document,
         Err(error) => {
             verdicts.note("atlas.json's values have their types", false, error);

@@ -83,12 +83,16 @@ fn main() {
     let corpus = std::env::var_os("AFFINE_ATLAS_CORPUS").map(PathBuf::from);
     let mut trials = Vec::new();
     // The longest come first, so that no core waits for them in the end.
-    trials.push(trial(
-        "quantum".into(),
-        corpus.clone(),
-        quantum::quarter_turns,
-    ));
     trials.push(trial("peers".into(), corpus.clone(), peers::beaten));
+    for (name, is_large) in [("quantum", false), ("quantum/large", true)] {
+        let case = move |corpus: &Path| {
+            let models = SPHERES.into_iter();
+            quantum::quarter_turns(corpus, models.filter(|m| LARGE.contains(m) == is_large))
+        };
+        let is_ignored = is_large || corpus.is_none();
+        let trial = trial(name.into(), corpus.clone(), case);
+        trials.push(trial.with_ignored_flag(is_ignored));
+    }
     for model in VARIED {
         let case = move |corpus: &Path| stability::invariance(&corpus.join(model));
         trials.push(trial(format!("invariance/{model}"), corpus.clone(), case));

@@ -1,6 +1,6 @@
 //! Cones of multiples of π/2.
 
-use crate::{SPHERES, models};
+use crate::models;
 use affine_atlas::flow::cones::{BoundaryCondition, ConeParams, PiMultiple};
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
@@ -11,10 +11,13 @@ const MEAN_RATIO: f64 = 1.3;
 const COUNTS: [usize; 3] = [4, 8, 16];
 
 /// Seamless, and hardly worse than with any curvatures.
-pub fn quarter_turns(corpus: &Path) -> Result<(), String> {
+pub fn quarter_turns(
+    corpus: &Path,
+    models: impl Iterator<Item = &'static str>,
+) -> Result<(), String> {
     let quantum = PiMultiple::fraction(1, 2).ok_or("1/2")?;
     let mut ratios = Vec::new();
-    for model in SPHERES {
+    for model in models {
         let triangles = models::read(&corpus.join(model));
         let mesh = models::mesh(&triangles);
         for count in COUNTS {

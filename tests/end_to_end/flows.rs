@@ -85,11 +85,13 @@ fn solvers_agree_on_a_sphere() {
 }
 
 #[test]
+#[ignore = "long"]
 fn solvers_agree_on_a_torus() {
     solvers_agree("genus-1-mug.off", "tangential", "cones.strategy=auto");
 }
 
 #[test]
+#[ignore = "long"]
 fn solvers_agree_on_a_disk() {
     solvers_agree("disk-mask.obj", "vertex-scaling", "cones.strategy=auto");
 }

@@ -1,15 +1,18 @@
-//! The whole program on the committed fixtures, as a user runs it.
+//! The whole program on the committed fixtures, as a user runs it; its messages, its readers, its verification, and what is committed with it.
 
 mod arrays;
 mod boundaries;
 mod channels;
+mod cli_messages;
 mod command;
 mod dependencies;
 mod documents;
 mod existence;
 mod features;
 mod fit;
+mod fixtures;
 mod flows;
+mod fuzz_corpus;
 mod good;
 mod grids;
 mod hard;
@@ -20,12 +23,15 @@ mod prescriptions;
 mod profile;
 #[path = "../real_models/mod.rs"]
 mod real_models;
+mod reading;
 mod rebuild;
 mod refusals;
 mod replacing;
+mod schema;
 mod survey;
 mod texture;
 mod units;
+mod verifying;
 mod whole;
 
 /// Files of the run as a whole, beside the folders of assets.

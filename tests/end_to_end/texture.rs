@@ -1,6 +1,7 @@
 //! Textures of whole builds: read back from their files and from the arrays they were made from.
 
 use crate::command::{Built, build, build_small, program};
+use crate::fixtures::generate::pattern;
 use crate::good::files;
 use affine_atlas::job::texture::{TextureParams, TexturedAsset, texture as lay};
 use affine_atlas::read::gridded::{GriddedSurface, read_gridded};
@@ -8,9 +9,6 @@ use std::collections::HashMap;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::Output;
-
-#[path = "../../fixtures/generate/pattern.rs"]
-mod pattern;
 
 const WAVES: &str = "fixtures/patterns/waves.png";
 

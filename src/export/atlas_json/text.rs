@@ -23,11 +23,14 @@ impl Document {
         text
     }
 
+    /// The members of the file. Through its text: a second writer of all types would cost as much to compile.
+    pub(in crate::export) fn to_value(&self) -> serde_json::Value {
+        serde_json::from_str(&self.to_text()).expect("what was written as JSON")
+    }
+
     /// An error that names the first number which JSON cannot hold.
     pub(super) fn check_finite(&self) -> Result<(), ExportError> {
-        let value = serde_json::to_value(self)
-            .expect("string keys and no custom serialiser, so that serialisation cannot fail");
-        match first_null(&value, "atlas.json") {
+        match first_null(&self.to_value(), "atlas.json") {
             Some(place) => Err(ExportError::NotFinite { place }),
             None => Ok(()),
         }

@@ -108,7 +108,7 @@ fn page(
         }
     }
     body.push_str("<h2>Figures</h2>\n");
-    body.push_str(&tables::figures(&serde_json::json!(document)));
+    body.push_str(&tables::figures(&document.to_value()));
     let time = match document.metric.solver {
         Solver::Newton => "step",
         Solver::Gradient => "flow time",

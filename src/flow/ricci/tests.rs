@@ -498,7 +498,17 @@ fn surfaces_with_nothing_to_solve_are_done_at_once() {
 #[test]
 #[cfg_attr(not(corpus), ignore = "needs AFFINE_ATLAS_CORPUS")]
 fn corpus_flattens_with_tangent_circles() {
-    for shape in shapes::corpus() {
+    flatten_with_tangent_circles(shapes::corpus());
+}
+
+#[test]
+#[ignore = "long"]
+fn large_models_flatten_with_tangent_circles() {
+    flatten_with_tangent_circles(shapes::large_models());
+}
+
+fn flatten_with_tangent_circles(models: Vec<Shape>) {
+    for shape in models {
         let prescription = shape.prescribe_default();
         match run(&shape, &prescription, Scheme::Tangential) {
             Ok(flat) => {
@@ -519,7 +529,17 @@ fn corpus_flattens_with_tangent_circles() {
 #[test]
 #[cfg_attr(not(corpus), ignore = "needs AFFINE_ATLAS_CORPUS")]
 fn corpus_flattens_with_other_schemes_or_says_why_not() {
-    for shape in shapes::corpus() {
+    flatten_with_other_schemes_or_say_why_not(shapes::corpus());
+}
+
+#[test]
+#[ignore = "long"]
+fn large_models_flatten_with_other_schemes_or_say_why_not() {
+    flatten_with_other_schemes_or_say_why_not(shapes::large_models());
+}
+
+fn flatten_with_other_schemes_or_say_why_not(models: Vec<Shape>) {
+    for shape in models {
         let prescription = shape.prescribe_default();
         for scheme in &SCHEMES[1..] {
             match run(&shape, &prescription, *scheme) {
@@ -568,7 +588,7 @@ fn corpus_rocker_arm_has_its_known_area_distortion() {
 }
 
 #[test]
-#[cfg_attr(not(corpus), ignore = "needs AFFINE_ATLAS_CORPUS")]
+#[ignore = "long"]
 fn corpus_gradient_flow_is_a_straight_line() {
     let Some(shape) = shapes::corpus_model("spot.obj") else {
         return;

@@ -454,7 +454,17 @@ fn what_is_no_closed_surface_with_lengths_is_refused() {
 #[test]
 #[cfg_attr(not(corpus), ignore = "needs AFFINE_ATLAS_CORPUS")]
 fn every_closed_model_becomes_seamless() {
-    for shape in shapes::corpus() {
+    closed_ones_become_seamless(shapes::corpus());
+}
+
+#[test]
+#[ignore = "long"]
+fn large_models_become_seamless() {
+    closed_ones_become_seamless(shapes::large_models());
+}
+
+fn closed_ones_become_seamless(models: Vec<Shape>) {
+    for shape in models {
         if !shape.connectivity.is_closed() {
             continue;
         }

@@ -3,7 +3,7 @@
 //! Needs Chromium on the path (or named by `CHROMIUM`) and Playwright for `AFFINE_ATLAS_PYTHON` (or `python3`); without them the cases are
 //! reported as ignored. `SCREENSHOTS=DIR` keeps pictures of the pages.
 
-use libtest_mimic::{Arguments, Failed, Trial};
+use libtest_mimic::{Failed, Trial};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -11,13 +11,12 @@ use std::process::{Command, Output};
 /// A name that would be markup if it were not text.
 const HOSTILE: &str = "<img src=x onerror=alert(1)>&amp;\"'";
 
-fn main() {
-    let arguments = Arguments::from_args();
+pub fn trials() -> Vec<Trial> {
     let ignored = !has_browser();
     let trial = |name: &str, test: fn() -> Result<(), Failed>| {
-        Trial::test(name, test).with_ignored_flag(ignored)
+        Trial::test(format!("pages/{name}"), test).with_ignored_flag(ignored)
     };
-    let trials = vec![
+    vec![
         trial("closed", || report("genus-3-pretzel.obj", "closed", &[])),
         trial("boundaries", || {
             report("three-boundaries-rabbit.ply", "boundaries", &[])
@@ -28,8 +27,7 @@ fn main() {
         trial("hostile_name", || report("disk-mask.obj", HOSTILE, &[])),
         trial("undrawn", undrawn),
         trial("index", index),
-    ];
-    libtest_mimic::run(&arguments, trials).exit();
+    ]
 }
 
 fn python() -> OsString {

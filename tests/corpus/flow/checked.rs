@@ -1,7 +1,7 @@
 //! What the flow found, as a whole atlas: the program builds it, its own `verify` and an independent checker look at it.
 
-use crate::models::Model;
-use crate::prescriptions;
+use super::models::Model;
+use super::prescriptions;
 use crate::real_models::{checked, comparable, succeed};
 use std::path::Path;
 use std::process::Command;

@@ -1,6 +1,6 @@
 //! Damaged files, byte by byte: always a failed check, never a panic, never more memory than the file can fill.
 
-use crate::fixture::{Npy, torus, tube, write_npz};
+use crate::verifying::fixture::{Npy, torus, tube, write_npz};
 use affine_atlas::verify::{Verdicts, VerifyOptions, verify};
 use serde_json::{Value, json};
 use std::io::Write;
@@ -383,7 +383,7 @@ fn a_surface_without_faces_is_a_failed_check() {
     let folder = tempfile::tempdir().expect("a folder");
     let atlas = torus();
     atlas.write(folder.path());
-    let arrays = crate::fixture::Arrays::default();
+    let arrays = crate::verifying::fixture::Arrays::default();
     write_npz(&folder.path().join("atlas.npz"), &arrays.npy());
     assert_eq!(
         failed(&run(folder.path())),

@@ -1,6 +1,6 @@
 //! Random prescriptions on real models: the flow must reach every one that meets Gauss–Bonnet.
 
-use crate::models::{Model, Random};
+use super::models::{Model, Random};
 use affine_atlas::flow::cones::{BoundaryCondition, Prescription};
 use affine_atlas::geometry::ids::VertexVec;
 use std::f64::consts::PI;

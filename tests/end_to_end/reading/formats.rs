@@ -615,19 +615,19 @@ fn stl_refusals() {
 #[test]
 fn damaged_files_are_read_or_refused() {
     for (name, bytes) in tetrahedra() {
-        crate::mutation::survive(name, &bytes, 3000);
+        super::mutation::survive(name, &bytes, 3000);
     }
-    crate::mutation::survive("a.stl", stl_text().as_bytes(), 3000);
-    crate::mutation::survive("b.stl", &stl_binary(), 3000);
+    super::mutation::survive("a.stl", stl_text().as_bytes(), 3000);
+    super::mutation::survive("b.stl", &stl_binary(), 3000);
     let obj = "o a\nv 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 1 1 0 0 0 1\nvt 0 0\nvt 1 0\nvn 0 0 1\nusemtl m\nf 1/1/1 2/2/1 3//1 \\\n1\nf -3 -2 -1\n";
-    crate::mutation::survive("a.obj", obj.as_bytes(), 6000);
+    super::mutation::survive("a.obj", obj.as_bytes(), 6000);
     let off = "STCNOFF\n3 1 0\n0 0 0 0 0 1 255 0 51 0.25 0.75\n1 0 0 0 0 1 0.5 0.25 0.125 0.5 1 1\n0 1 0 0 0 1 0 0 0 0 0\n3 0 1 2\n";
-    crate::mutation::survive("a.off", off.as_bytes(), 6000);
+    super::mutation::survive("a.off", off.as_bytes(), 6000);
     let header = format!(
         "element vertex 4\n{XYZ}property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float s\nproperty float t\n\
          property list uchar int near\nelement face 2\nproperty list uchar int vertex_indices\nproperty list uchar float texcoord\n\
          element tristrips 1\nproperty list int int vertex_indices\n"
     );
     let body = "0 0 0 1 2 3 0 0 0\n1 0 0 1 2 3 0 0 2 5 6\n1 1 0 1 2 3 0 0 0\n0 1 0 1 2 3 1 1 0\n3 0 1 2 6 0 0 1 0 1 1\n3 0 2 3 0\n6 0 1 2 -1 3 2\n";
-    crate::mutation::survive("a.ply", ply(&header, body).as_bytes(), 6000);
+    super::mutation::survive("a.ply", ply(&header, body).as_bytes(), 6000);
 }

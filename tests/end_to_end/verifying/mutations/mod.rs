@@ -15,7 +15,7 @@ mod charts;
 mod images;
 mod metric;
 
-use crate::fixture::{Atlas, Picture, cone, pillow, torus, tube};
+use crate::verifying::fixture::{Atlas, Picture, cone, pillow, torus, tube};
 use affine_atlas::verify::{VerifyOptions, verify};
 use serde_json::json;
 use std::collections::BTreeSet;

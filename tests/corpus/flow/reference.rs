@@ -1,6 +1,6 @@
 //! Agreement with an independent prototype.
 
-use crate::models::Model;
+use super::models::Model;
 use std::io::Read;
 use std::path::Path;
 

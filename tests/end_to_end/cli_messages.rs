@@ -3,10 +3,8 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-#[path = "cli_messages/plans.rs"]
 mod plans;
 
-#[path = "cli_messages/streams.rs"]
 mod streams;
 
 /// Runs the command in a folder, as if its output went to a file.
@@ -485,7 +483,7 @@ fn texture_without_a_folder_or_a_pattern() {
     insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @"failed: atlas (input): the pattern a.png is no image that can be read (Format error decoding Png: Invalid PNG signature.); give a PNG or JPEG file");
     std::fs::write(
         folder.path().join("a.png"),
-        include_bytes!("../fixtures/patterns/waves.png"),
+        include_bytes!("../../fixtures/patterns/waves.png"),
     )
     .expect("written");
     insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @r#"failed: atlas (input): atlas/atlas.json says format "", version 0; this program reads "affine-atlas", versions 1 and 2"#);
@@ -559,7 +557,7 @@ fn schema_and_explain_refuse_what_they_do_not_know() {
 #[test]
 fn explain_names_and_shows_the_faces_at_fault() {
     let folder = folder();
-    let strip = include_str!("../fixtures/bad/moebius-strip.obj");
+    let strip = include_str!("../../fixtures/bad/moebius-strip.obj");
     std::fs::write(folder.path().join("strip.obj"), strip).expect("written");
     let output = run(folder.path(), &["explain", "strip.obj", "-o", "why.glb"]);
     assert_eq!(output.status.code(), Some(1));

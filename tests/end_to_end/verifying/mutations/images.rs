@@ -416,7 +416,7 @@ pub fn mutations() -> Vec<Mutation> {
                 let mut part = a.arrays.clone();
                 part.faces.pop();
                 part.patch_uv.pop();
-                a.glb = crate::fixture::glb(&part);
+                a.glb = crate::verifying::fixture::glb(&part);
             },
             ["surface.glb holds every face"]
         ),
@@ -435,7 +435,7 @@ pub fn mutations() -> Vec<Mutation> {
             |a| {
                 let mut other = a.arrays.clone();
                 other.positions[0][2] += 9.0;
-                a.glb = crate::fixture::glb(&other);
+                a.glb = crate::verifying::fixture::glb(&other);
             },
             ["surface.glb has the surface's bounding box"]
         ),
@@ -526,7 +526,7 @@ pub fn mutations() -> Vec<Mutation> {
             pillow,
             "an image of a few texels",
             |a| {
-                let (picture, record) = crate::fixture::picture(&a.arrays, 0, 7);
+                let (picture, record) = crate::verifying::fixture::picture(&a.arrays, 0, 7);
                 a.pictures[0] = picture;
                 a.json["patches"][0] = record;
             },
@@ -538,7 +538,7 @@ pub fn mutations() -> Vec<Mutation> {
             |a| {
                 let mut other = a.arrays.clone();
                 other.patch_uv[70] = other.patch_uv[0];
-                a.glb = crate::fixture::glb(&other);
+                a.glb = crate::verifying::fixture::glb(&other);
             },
             ["packed triangles do not overlap"]
         ),

@@ -3,7 +3,7 @@
 //! The torus of revolution ((R + r cos v) cos w, (R + r cos v) sin w, r sin v) is conformally flat with log scale −ln(R + r cos v) up to
 //! a constant. A regular grid would be exact and prove nothing, so vertices are moved by 30 % of the spacing in both angles.
 
-use crate::models::{Model, Random};
+use super::models::{Model, Random};
 use affine_atlas::geometry::triangle;
 use std::f64::consts::TAU;
 

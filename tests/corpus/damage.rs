@@ -3,14 +3,9 @@
 //! The cases run on committed fixtures, and on real models where `AFFINE_ATLAS_CORPUS` names a folder that has them;
 //! without it those are reported as ignored.
 
-#[path = "end_to_end/arrays.rs"]
-mod arrays;
-#[path = "end_to_end/command.rs"]
-mod command;
-
-use arrays::array;
-use command::{Built, build_small, document, verify};
-use libtest_mimic::{Arguments, Failed, Trial};
+use crate::arrays::array;
+use crate::command::{Built, build_small, document, verify};
+use libtest_mimic::{Failed, Trial};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -18,8 +13,7 @@ use std::time::{Duration, Instant};
 /// No atlas of a mesh this small, with small images, may take longer.
 const LIMIT: Duration = Duration::from_secs(10);
 
-fn main() {
-    let arguments = Arguments::from_args();
+pub fn trials() -> Vec<Trial> {
     let corpus = std::env::var_os("AFFINE_ATLAS_CORPUS").map(PathBuf::from);
     let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/good");
     let real = |name: &str| corpus.as_ref().map(|folder| folder.join(name));
@@ -35,7 +29,7 @@ fn main() {
         ("spot", real("spot.obj")),
     ] {
         for (defect, _, _) in DEFECTS {
-            add(format!("damage/{what}/{defect}"), mesh.clone(), damaged);
+            add(format!("damage/defect/{what}/{defect}"), mesh.clone(), damaged);
         }
     }
     for (what, mesh) in [
@@ -43,10 +37,10 @@ fn main() {
         ("rocker-arm", real("rocker-arm.obj")),
     ] {
         for (case, _, _) in SIMILARITIES {
-            add(format!("similarity/{what}/{case}"), mesh.clone(), similar);
+            add(format!("damage/similarity/{what}/{case}"), mesh.clone(), similar);
         }
     }
-    libtest_mimic::run(&arguments, trials).exit();
+    trials
 }
 
 fn run(mesh: Option<&Path>, case: &str, test: fn(&str, &Mesh)) -> Result<(), Failed> {

@@ -1,6 +1,6 @@
 //! Atlases that are right pass every check: alone, as components, and as assets of an output folder.
 
-use crate::fixture::{Atlas, cone, pillow, torus, tube};
+use crate::verifying::fixture::{Atlas, cone, pillow, torus, tube};
 use affine_atlas::verify::{
     SourceSurface, Verdicts, VerifyError, VerifyOptions, verify, verify_against,
 };

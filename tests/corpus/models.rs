@@ -4,14 +4,12 @@
 //! reported as ignored. Large models with other settings than the defaults are for `--ignored`. `AFFINE_ATLAS_CHECKER` names an independent checker of output folders (a
 //! Python script, run by `AFFINE_ATLAS_PYTHON` or `python3`); without it only the program's own `verify` is asked.
 
-mod real_models;
-
-use libtest_mimic::{Arguments, Failed, Trial};
-use real_models::grids::{CELLS, density, grids, wanted};
-use real_models::lines::lines;
-use real_models::plates::{obj, rounded};
-use real_models::watertight::watertight;
-use real_models::{CLEAN, LARGE, atlases, checked, checked_by, comparable, succeed};
+use libtest_mimic::{Failed, Trial};
+use crate::real_models::grids::{CELLS, density, grids, wanted};
+use crate::real_models::lines::lines;
+use crate::real_models::plates::{obj, rounded};
+use crate::real_models::watertight::watertight;
+use crate::real_models::{CLEAN, LARGE, atlases, checked, checked_by, comparable, succeed};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -62,8 +60,7 @@ const LEAST_FILLED: f64 = 0.8;
 /// What is done with the corpus' folder.
 type Case = Box<dyn FnOnce(&Path) -> Result<(), Failed> + Send>;
 
-fn main() {
-    let arguments = Arguments::from_args();
+pub fn trials() -> Vec<Trial> {
     let corpus = std::env::var_os("AFFINE_ATLAS_CORPUS").map(PathBuf::from);
     let mut trials = Vec::new();
     let mut add = |name: String, is_long: bool, run: Case| {
@@ -147,7 +144,7 @@ fn main() {
         Box::new(rocker_arm),
     );
     add("spot/quarter-turns".into(), false, Box::new(quarter_turns));
-    libtest_mimic::run(&arguments, trials).exit();
+    trials
 }
 
 /// Model files of a folder, by name.

@@ -1,7 +1,7 @@
 //! What must not matter: the order of vertices, the place and size of the mesh, the diagonals it came with.
 
-use crate::models::{Model, Random};
-use crate::prescriptions;
+use super::models::{Model, Random};
+use super::prescriptions;
 use affine_atlas::flow::cones::Prescription;
 use affine_atlas::flow::ricci::{self, FlowParams, Scheme};
 use affine_atlas::geometry::ids::{VertexId, VertexVec};

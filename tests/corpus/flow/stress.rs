@@ -1,7 +1,7 @@
 //! Meshes that break other methods: squashed, full of needles, coarse.
 
-use crate::models::{Model, Random};
-use crate::prescriptions;
+use super::models::{Model, Random};
+use super::prescriptions;
 use std::collections::{BTreeSet, BinaryHeap};
 use std::path::Path;
 

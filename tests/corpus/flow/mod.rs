@@ -7,18 +7,15 @@ mod checked;
 mod invariance;
 mod models;
 mod prescriptions;
-#[path = "../real_models/mod.rs"]
-mod real_models;
 mod reference;
 mod refinement;
 mod stress;
 
-use libtest_mimic::{Arguments, Failed, Trial};
-use real_models::{CLEAN, LARGE};
+use libtest_mimic::{Failed, Trial};
+use crate::real_models::{CLEAN, LARGE};
 use std::path::PathBuf;
 
-fn main() {
-    let arguments = Arguments::from_args();
+pub fn trials() -> Vec<Trial> {
     let folder = |name| std::env::var_os(name).map(PathBuf::from);
     let corpus = folder("AFFINE_ATLAS_CORPUS");
     let beside_checker = folder("AFFINE_ATLAS_CHECKER")
@@ -29,7 +26,7 @@ fn main() {
     for (name, ..) in CLEAN {
         let file = corpus.as_ref().map(|c| c.join(name));
         trials.push(
-            trial(format!("prescriptions/{name}"), file, |file| {
+            trial(format!("flow/prescriptions/{name}"), file, |file| {
                 prescriptions::converge(&file)
             })
             .with_ignored_flag(is_long(name)),
@@ -38,7 +35,7 @@ fn main() {
     for (name, ..) in CLEAN {
         let file = corpus.as_ref().map(|c| c.join(name));
         trials.push(
-            trial(format!("checked/{name}"), file, |file| {
+            trial(format!("flow/checked/{name}"), file, |file| {
                 checked::first_prescription(&file)
             })
             .with_ignored_flag(is_long(name)),
@@ -50,7 +47,7 @@ fn main() {
         ("fertility.off", 4),
     ] {
         let file = corpus.as_ref().map(|c| c.join(name));
-        trials.push(trial(format!("single-cone/{name}"), file, move |file| {
+        trials.push(trial(format!("flow/single-cone/{name}"), file, move |file| {
             checked::single_cone(&file, genus)
         }));
     }
@@ -64,7 +61,7 @@ fn main() {
         for (name, ..) in CLEAN {
             let file = corpus.as_ref().map(|c| c.join(name));
             let run = move |file: PathBuf| run(&file);
-            let trial = trial(format!("stress/{what}/{name}"), file, run);
+            let trial = trial(format!("flow/stress/{what}/{name}"), file, run);
             trials.push(trial.with_ignored_flag(is_long(name)));
         }
     }
@@ -76,16 +73,16 @@ fn main() {
     ] {
         let file = corpus.as_ref().map(|c| c.join(name));
         let run = |file: PathBuf| invariance::hold(&file);
-        trials.push(trial(format!("invariance/{name}"), file, run));
+        trials.push(trial(format!("flow/invariance/{name}"), file, run));
     }
-    trials.push(trial("refinement/torus".into(), Some(()), |()| {
+    trials.push(trial("flow/refinement/torus".into(), Some(()), |()| {
         refinement::torus()
     }));
     let both = corpus.clone().zip(beside_checker);
-    trials.push(trial("reference".into(), both, |(corpus, file)| {
+    trials.push(trial("flow/reference".into(), both, |(corpus, file)| {
         reference::agree(&corpus, &file)
     }));
-    libtest_mimic::run(&arguments, trials).exit();
+    trials
 }
 
 /// A case that is ignored where what it needs is not there.

@@ -1,7 +1,7 @@
 //! The committed fixtures are what their generator makes, and are as small as promised.
 
-#[path = "../fixtures/generate/mod.rs"]
-mod generate;
+#[path = "../../fixtures/generate/mod.rs"]
+pub mod generate;
 
 use std::collections::BTreeMap;
 use std::path::Path;

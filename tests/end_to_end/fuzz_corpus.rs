@@ -1,6 +1,6 @@
 //! Seeds and findings of the fuzzers, once each through the same functions as there: `fuzz/README.md`.
 
-#[path = "../fuzz/src/targets.rs"]
+#[path = "../../fuzz/src/targets.rs"]
 mod targets;
 
 use std::fs;

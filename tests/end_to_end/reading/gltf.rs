@@ -1568,10 +1568,10 @@ fn texture_transforms_are_written_into_the_coordinates() {
 
 #[test]
 fn damaged_assets_are_read_or_refused() {
-    crate::mutation::survive("square.glb", &square().glb(), 6000);
-    crate::mutation::survive("meshopt.glb", &meshopt().glb(), 6000);
+    super::mutation::survive("square.glb", &square().glb(), 6000);
+    super::mutation::survive("meshopt.glb", &meshopt().glb(), 6000);
     for hex in DRACO {
-        crate::mutation::survive("draco.glb", &draco(hex).glb(), 3000);
+        super::mutation::survive("draco.glb", &draco(hex).glb(), 3000);
         // Damage to the stream alone, which the decoder must survive.
         let whole = draco(hex);
         for at in 0..whole.binary.len() {
@@ -1616,5 +1616,5 @@ fn damaged_assets_are_read_or_refused() {
         base64(&asset.binary)
     );
     asset.json["buffers"] = json!([{"byteLength": asset.binary.len(), "uri": uri}]);
-    crate::mutation::survive("rich.gltf", &asset.json_bytes(), 8000);
+    super::mutation::survive("rich.gltf", &asset.json_bytes(), 8000);
 }

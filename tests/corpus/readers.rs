@@ -7,15 +7,14 @@
 use affine_atlas::config;
 use affine_atlas::job;
 use affine_atlas::outcome::AssetState;
-use libtest_mimic::{Arguments, Failed, Trial};
+use libtest_mimic::{Failed, Trial};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const FIXTURE: &str = "fixtures/good/genus-0-animal.ply";
 
-fn main() {
-    let arguments = Arguments::from_args();
+pub fn trials() -> Vec<Trial> {
     let cases = [
         ("default", "images.domain=grid"),
         ("flat", "images.domain=flat"),
@@ -24,16 +23,15 @@ fn main() {
     ];
     let is_ignored = !has_modules("numpy, OpenEXR, OpenImageIO, cv2");
     let images = cases.map(|(name, key)| {
-        let trial = Trial::test(name, move || read_alike(key));
+        let trial = Trial::test(format!("readers/{name}"), move || read_alike(key));
         trial.with_ignored_flag(is_ignored)
     });
     let has_numpy = has_modules("numpy");
     let seams = ["genus-1-mug.off", "genus-2-amphora.glb", "disk-mask.obj"].map(|fixture| {
-        let trial = Trial::test(format!("seams/{fixture}"), move || seams_close(fixture));
+        let trial = Trial::test(format!("readers/seams/{fixture}"), move || seams_close(fixture));
         trial.with_ignored_flag(!has_numpy)
     });
-    let trials = images.into_iter().chain(seams).collect();
-    libtest_mimic::run(&arguments, trials).exit();
+    images.into_iter().chain(seams).collect()
 }
 
 fn python() -> OsString {

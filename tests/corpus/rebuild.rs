@@ -1,10 +1,8 @@
 //! Meshes rebuilt from the geometry images of real models: watertight at every resolution, and nearer the surface at the
-//! rate that exact sampling gives. (Whether those of default builds are watertight is asked in `corpus`, which has them.)
+//! rate that exact sampling gives. (Whether those of default builds are watertight is asked in `models`, which has them.)
 //!
 //! `AFFINE_ATLAS_CORPUS` names a folder with the models; without it every case is reported as ignored. `AFFINE_ATLAS_CHECKER` names an
 //! independent checker, which is asked about grids. Large models are for `--ignored`.
-
-mod real_models;
 
 use affine_atlas::atlas::patches::{Domain, PatchParams, layout};
 use affine_atlas::atlas::{geometry_image, patches::PatchLayout};
@@ -16,9 +14,9 @@ use affine_atlas::product::AffineAtlas;
 use affine_atlas::read::{ReadParams, read};
 use affine_atlas::rebuild::{Images, rebuild};
 use affine_atlas::{build, job};
-use libtest_mimic::{Arguments, Failed, Trial};
-use real_models::watertight::watertight;
-use real_models::{CLEAN, LARGE, checked, comparable};
+use libtest_mimic::{Failed, Trial};
+use crate::real_models::watertight::watertight;
+use crate::real_models::{CLEAN, LARGE, checked, comparable};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
@@ -48,37 +46,36 @@ const SAMPLING: Sampling = Sampling {
     vertices: 0,
 };
 
-fn main() {
-    let arguments = Arguments::from_args();
+pub fn trials() -> Vec<Trial> {
     let corpus = std::env::var_os("AFFINE_ATLAS_CORPUS").map(PathBuf::from);
     let is_ignored = corpus.is_none();
     let folder = corpus.unwrap_or_default();
     let is_long = |file: &str| is_ignored || LARGE.contains(&file);
     // The longest comes first, so that no core waits for it in the end.
     let mut trials = vec![
-        Trial::test("order/smooth/720", || smooth(720, &[64, 128, 256])).with_ignored_flag(true),
-        Trial::test("order/smooth/360", || smooth(360, &[32, 64, 128]))
+        Trial::test("rebuild/order/smooth/720", || smooth(720, &[64, 128, 256])).with_ignored_flag(true),
+        Trial::test("rebuild/order/smooth/360", || smooth(360, &[32, 64, 128]))
             .with_ignored_flag(is_ignored),
     ];
     for (file, genus, loops) in CLEAN {
-        // At 512², the default, the atlases of `corpus` are asked.
+        // At 512², the default, the atlases of `models` are asked.
         let flat = [256, 64].map(|side| (Texels::Flat, side));
         for (texels, side) in flat.into_iter().chain([(Texels::Grid, CHECKED)]) {
             let model = folder.join(file);
             let run = move || built(&model, texels, side, genus, loops);
-            let name = format!("watertight/{texels:?}/{side}/{file}");
+            let name = format!("rebuild/watertight/{texels:?}/{side}/{file}");
             trials.push(Trial::test(name, run).with_ignored_flag(is_long(file)));
         }
     }
     for file in PIECEWISE_LINEAR {
         let model = folder.join(file);
-        let trial = Trial::test(format!("order/{file}"), move || {
+        let trial = Trial::test(format!("rebuild/order/{file}"), move || {
             let soup = read(&model, &ReadParams::default())?.soup;
             order(file, &soup, &[64, 128, 256, 512], 1.4)
         });
         trials.push(trial.with_ignored_flag(is_long(file)));
     }
-    libtest_mimic::run(&arguments, trials).exit();
+    trials
 }
 
 /// The mesh rebuilt from the images of one build.
