@@ -233,8 +233,32 @@ impl<W: Write + Seek> Archive<W> {
         shape: &[usize],
         values: impl Iterator<Item = T>,
     ) -> Result<(), EncodeError> {
+        let mut buffer = self.start(name, shape, T::DESCR, size_of::<T>())?;
+        let mut written = 0;
+        for value in values {
+            buffer.write_all(value.little_endian().as_ref())?;
+            written += 1;
+        }
+        buffer.flush()?;
         let count: usize = shape.iter().product();
-        let bytes = count as u64 * size_of::<T>() as u64;
+        match written == count {
+            true => Ok(()),
+            false => Err(EncodeError::Format(format!(
+                "atlas.npz {name} has {written} numbers and a shape for {count}"
+            ))),
+        }
+    }
+
+    /// Begins an array of numbers of so many bytes; they follow.
+    fn start(
+        &mut self,
+        name: &str,
+        shape: &[usize],
+        descr: &str,
+        size: usize,
+    ) -> Result<BufWriter<&mut ZipWriter<W>>, EncodeError> {
+        let count: usize = shape.iter().product();
+        let bytes = count as u64 * size as u64;
         let options = SimpleFileOptions::default()
             .compression_method(CompressionMethod::Deflated)
             .compression_level(Some(COMPRESSION_LEVEL))
@@ -246,19 +270,8 @@ impl<W: Write + Seek> Archive<W> {
             .start_file(format!("{name}.npy"), options)
             .map_err(zip_error)?;
         let mut buffer = BufWriter::with_capacity(BUFFER_BYTES, &mut self.zip);
-        buffer.write_all(&header(T::DESCR, shape))?;
-        let mut written = 0;
-        for value in values {
-            buffer.write_all(value.little_endian().as_ref())?;
-            written += 1;
-        }
-        buffer.flush()?;
-        match written == count {
-            true => Ok(()),
-            false => Err(EncodeError::Format(format!(
-                "atlas.npz {name} has {written} numbers and a shape for {count}"
-            ))),
-        }
+        buffer.write_all(&header(descr, shape))?;
+        Ok(buffer)
     }
 }
 

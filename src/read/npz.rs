@@ -9,6 +9,7 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 use zip::ZipArchive;
+use zip::read::ZipFile;
 
 /// Longest header that is read (NumPy writes less than 200 bytes for arrays like ours).
 const HEADER_LIMIT: usize = 1 << 16;
@@ -94,14 +95,47 @@ impl Npz {
         shape: &[Option<usize>],
     ) -> Result<(Vec<T>, usize), String> {
         let at = |what: String| format!("{name}: {what}");
+        let kind = Kind {
+            descr: T::DESCR,
+            name: T::NAME,
+            size: T::SIZE,
+            numbers: T::NUMBERS,
+        };
+        let mut entry = self.entry(name, shape, &kind)?;
+        let mut values = Vec::with_capacity(entry.count.min(1 << 16));
+        let mut buffer = vec![0; T::SIZE * (1_usize << 16).div_ceil(T::SIZE)];
+        let mut left = T::SIZE * entry.count;
+        while left > 0 {
+            let now = left.min(buffer.len());
+            let read = entry.data.read_exact(&mut buffer[..now]);
+            read.map_err(|error| at(format!("is cut short: {error}")))?;
+            values.extend(buffer[..now].chunks_exact(T::SIZE).map(T::from_le));
+            left -= now;
+        }
+        // Reading past the end makes the container test its checksum.
+        match entry.data.read(&mut buffer) {
+            Ok(0) => Ok((values, entry.extent)),
+            Ok(_) => Err(at("holds more than its shape says".to_owned())),
+            Err(error) => Err(at(error.to_string())),
+        }
+    }
+
+    /// Opens one array at the first of its data. Its elements must be of the kind, its shape must be `shape`.
+    fn entry(
+        &mut self,
+        name: &str,
+        shape: &[Option<usize>],
+        kind: &Kind,
+    ) -> Result<Entry<'_>, String> {
+        let at = |what: String| format!("{name}: {what}");
         let mut entry = self
             .archive
             .by_name(&format!("{name}.npy"))
             .map_err(|error| at(error.to_string()))?;
         let stored = entry.size();
         let (header, header_bytes) = read_header(&mut entry).map_err(at)?;
-        if !T::DESCR.contains(&header.descr.as_str()) {
-            return Err(at(format!("type {} is not {}", header.descr, T::NAME)));
+        if !kind.descr.contains(&header.descr.as_str()) {
+            return Err(at(format!("type {} is not {}", header.descr, kind.name)));
         }
         if header.fortran_order && header.shape.len() > 1 {
             return Err(at("is in Fortran order, not C order".to_owned()));
@@ -126,9 +160,9 @@ impl Npz {
             .shape
             .iter()
             .try_fold(1usize, |product, n| product.checked_mul(*n));
-        let count = count.filter(|count| count.is_multiple_of(T::NUMBERS));
-        let count = count.map(|count| count / T::NUMBERS);
-        let bytes = count.and_then(|count| count.checked_mul(T::SIZE));
+        let count = count.filter(|count| count.is_multiple_of(kind.numbers));
+        let count = count.map(|count| count / kind.numbers);
+        let bytes = count.and_then(|count| count.checked_mul(kind.size));
         let (Some(count), Some(bytes)) = (count, bytes) else {
             return Err(at(format!("shape {:?} is impossible", header.shape)));
         };
@@ -148,24 +182,29 @@ impl Npz {
             )));
         };
         self.left = left;
-        let mut values = Vec::with_capacity(count.min(1 << 16));
-        let mut buffer = vec![0; T::SIZE * (1_usize << 16).div_ceil(T::SIZE)];
-        let mut left = bytes;
-        while left > 0 {
-            let now = left.min(buffer.len());
-            entry
-                .read_exact(&mut buffer[..now])
-                .map_err(|error| at(format!("is cut short: {error}")))?;
-            values.extend(buffer[..now].chunks_exact(T::SIZE).map(T::from_le));
-            left -= now;
-        }
-        // Reading past the end makes the container test its checksum.
-        match entry.read(&mut buffer) {
-            Ok(0) => Ok((values, header.shape[0])),
-            Ok(_) => Err(at("holds more than its shape says".to_owned())),
-            Err(error) => Err(at(error.to_string())),
-        }
+        Ok(Entry {
+            data: entry,
+            count,
+            extent: header.shape[0],
+        })
     }
+}
+
+/// What an [`Element`] is.
+struct Kind {
+    descr: &'static [&'static str],
+    name: &'static str,
+    size: usize,
+    numbers: usize,
+}
+
+/// An array that can be read.
+struct Entry<'a> {
+    data: ZipFile<'a, BufReader<File>>,
+    /// Elements.
+    count: usize,
+    /// Along the first axis.
+    extent: usize,
 }
 
 #[derive(Debug, PartialEq)]
