@@ -125,7 +125,8 @@ impl Config {
     #[must_use]
     pub fn flat(&self) -> BTreeMap<String, serde_json::Value> {
         let mut flat = BTreeMap::new();
-        let value = serde_json::from_slice(&self.canonical_json()).expect("what was written as JSON");
+        let value =
+            serde_json::from_slice(&self.canonical_json()).expect("what was written as JSON");
         let mut pending = vec![(String::new(), value)];
         while let Some((path, value)) = pending.pop() {
             match value {

@@ -3,8 +3,8 @@
 //! The cases run on committed fixtures, and on real models where `AFFINE_ATLAS_CORPUS` names a folder that has them;
 //! without it those are reported as ignored.
 
-use crate::arrays::array;
 use crate::command::{Built, build_small, document, verify};
+use crate::real_models::arrays::array;
 use libtest_mimic::{Failed, Trial};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -29,7 +29,11 @@ pub fn trials() -> Vec<Trial> {
         ("spot", real("spot.obj")),
     ] {
         for (defect, _, _) in DEFECTS {
-            add(format!("damage/defect/{what}/{defect}"), mesh.clone(), damaged);
+            add(
+                format!("damage/defect/{what}/{defect}"),
+                mesh.clone(),
+                damaged,
+            );
         }
     }
     for (what, mesh) in [
@@ -37,7 +41,11 @@ pub fn trials() -> Vec<Trial> {
         ("rocker-arm", real("rocker-arm.obj")),
     ] {
         for (case, _, _) in SIMILARITIES {
-            add(format!("damage/similarity/{what}/{case}"), mesh.clone(), similar);
+            add(
+                format!("damage/similarity/{what}/{case}"),
+                mesh.clone(),
+                similar,
+            );
         }
     }
     trials

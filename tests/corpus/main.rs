@@ -4,8 +4,6 @@
 //! Cases that need what is not there are reported as ignored: `AFFINE_ATLAS_CORPUS` names a folder with the models, `AFFINE_ATLAS_CHECKER` an independent
 //! checker (a Python script), `AFFINE_ATLAS_PYTHON` (or `python3`) its interpreter. Large models are for `--ignored`.
 
-#[path = "../end_to_end/arrays.rs"]
-mod arrays;
 #[path = "../end_to_end/command.rs"]
 mod command;
 mod damage;

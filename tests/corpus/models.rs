@@ -4,12 +4,12 @@
 //! reported as ignored. Large models with other settings than the defaults are for `--ignored`. `AFFINE_ATLAS_CHECKER` names an independent checker of output folders (a
 //! Python script, run by `AFFINE_ATLAS_PYTHON` or `python3`); without it only the program's own `verify` is asked.
 
-use libtest_mimic::{Failed, Trial};
 use crate::real_models::grids::{CELLS, density, grids, wanted};
 use crate::real_models::lines::lines;
 use crate::real_models::plates::{obj, rounded};
 use crate::real_models::watertight::watertight;
 use crate::real_models::{CLEAN, LARGE, atlases, checked, checked_by, comparable, succeed};
+use libtest_mimic::{Failed, Trial};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

@@ -28,7 +28,9 @@ pub fn trials() -> Vec<Trial> {
     });
     let has_numpy = has_modules("numpy");
     let seams = ["genus-1-mug.off", "genus-2-amphora.glb", "disk-mask.obj"].map(|fixture| {
-        let trial = Trial::test(format!("readers/seams/{fixture}"), move || seams_close(fixture));
+        let trial = Trial::test(format!("readers/seams/{fixture}"), move || {
+            seams_close(fixture)
+        });
         trial.with_ignored_flag(!has_numpy)
     });
     images.into_iter().chain(seams).collect()

@@ -4,6 +4,8 @@
 //! `AFFINE_ATLAS_CORPUS` names a folder with the models; without it every case is reported as ignored. `AFFINE_ATLAS_CHECKER` names an
 //! independent checker, which is asked about grids. Large models are for `--ignored`.
 
+use crate::real_models::watertight::watertight;
+use crate::real_models::{CLEAN, LARGE, checked, comparable};
 use affine_atlas::atlas::patches::{Domain, PatchParams, layout};
 use affine_atlas::atlas::{geometry_image, patches::PatchLayout};
 use affine_atlas::config::Config;
@@ -15,8 +17,6 @@ use affine_atlas::read::{ReadParams, read};
 use affine_atlas::rebuild::{Images, rebuild};
 use affine_atlas::{build, job};
 use libtest_mimic::{Failed, Trial};
-use crate::real_models::watertight::watertight;
-use crate::real_models::{CLEAN, LARGE, checked, comparable};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
@@ -53,7 +53,8 @@ pub fn trials() -> Vec<Trial> {
     let is_long = |file: &str| is_ignored || LARGE.contains(&file);
     // The longest comes first, so that no core waits for it in the end.
     let mut trials = vec![
-        Trial::test("rebuild/order/smooth/720", || smooth(720, &[64, 128, 256])).with_ignored_flag(true),
+        Trial::test("rebuild/order/smooth/720", || smooth(720, &[64, 128, 256]))
+            .with_ignored_flag(true),
         Trial::test("rebuild/order/smooth/360", || smooth(360, &[32, 64, 128]))
             .with_ignored_flag(is_ignored),
     ];

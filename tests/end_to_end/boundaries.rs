@@ -1,7 +1,7 @@
 //! Prescribed boundaries: rectangles, uniform curvature, single vertices.
 
-use crate::arrays::array;
 use crate::command::{build_small, document, verify};
+use crate::real_models::arrays::array;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};

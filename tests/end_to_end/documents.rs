@@ -1,7 +1,7 @@
 //! `docs/output.md` describes every key and every array that a build writes, and no others; links in the documents lead somewhere.
 
 use super::command::{build, document, program};
-use npyz::NpyFile;
+use crate::real_models::arrays::Npy;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -152,7 +152,7 @@ fn every_array_of_atlas_npz_is_described() {
         let cells: Vec<&str> = row.expect("described").split(" | ").collect();
         let numbers = cells[1].trim_matches(['(', ')']).split(',').map(str::trim);
         let numbers = numbers.filter(|n| !n.is_empty());
-        let stated: Vec<u64> = numbers
+        let stated: Vec<usize> = numbers
             .map(|n| counts.get(n).copied().or(n.parse().ok()).expect(n))
             .collect();
         assert_eq!(&stated, shape, "{name}");
@@ -294,7 +294,7 @@ fn the_readme_is_short_and_says_what_it_is_for() {
 }
 
 /// NumPy's name of the type and the shape of every array.
-fn shapes(atlas: &Path) -> BTreeMap<String, (&'static str, Vec<u64>)> {
+fn shapes(atlas: &Path) -> BTreeMap<String, (&'static str, Vec<usize>)> {
     let file = File::open(atlas.join("atlas.npz")).expect("atlas.npz");
     let mut archive = zip::ZipArchive::new(file).expect("a zip file");
     let mut found = BTreeMap::new();
@@ -303,8 +303,8 @@ fn shapes(atlas: &Path) -> BTreeMap<String, (&'static str, Vec<u64>)> {
         let file_name = entry.name().expect("a name").into_owned();
         let mut bytes = Vec::new();
         entry.read_to_end(&mut bytes).expect("readable");
-        let array = NpyFile::new(&bytes[..]).expect("a NumPy array");
-        let dtype = match array.dtype().descr().trim_matches('\'') {
+        let array = Npy::new(&bytes);
+        let dtype = match array.descr.as_str() {
             "<f8" => "float64",
             "<u4" => "uint32",
             "|u1" => "uint8",
@@ -312,7 +312,7 @@ fn shapes(atlas: &Path) -> BTreeMap<String, (&'static str, Vec<u64>)> {
             other => panic!("{file_name}: {other}"),
         };
         let name = file_name.trim_end_matches(".npy").to_owned();
-        found.insert(name, (dtype, array.shape().to_vec()));
+        found.insert(name, (dtype, array.shape.clone()));
     }
     found
 }

@@ -1,7 +1,8 @@
 //! Sharp edges as lines of the atlas, on a part with junctions of three and four of them.
 
 use crate::command::{build_small, document, verify};
-use crate::real_models::lines::{array, lines};
+use crate::real_models::arrays::array;
+use crate::real_models::lines::lines;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 

@@ -1,7 +1,7 @@
 //! Schemes and solvers.
 
-use crate::arrays::array;
 use crate::command::{build_small, document, verify};
+use crate::real_models::arrays::array;
 use std::path::Path;
 
 fn fixture(name: &str) -> std::path::PathBuf {

@@ -1,8 +1,8 @@
 //! Grids: full images whose sides hold the same points, on every good fixture; checked from the files alone.
 
-use crate::arrays::array;
 use crate::command::{build, build_into, document, verify};
 use crate::good::files;
+use crate::real_models::arrays::array;
 use affine_atlas::read::atlas::{StoredImage, read_images};
 use serde_json::Value;
 use std::path::Path;

@@ -1,6 +1,5 @@
 //! The whole program on the committed fixtures, as a user runs it; its messages, its readers, its verification, and what is committed with it.
 
-mod arrays;
 mod boundaries;
 mod channels;
 mod cli_messages;
@@ -21,9 +20,9 @@ mod interrupt;
 mod packed;
 mod prescriptions;
 mod profile;
+mod reading;
 #[path = "../real_models/mod.rs"]
 mod real_models;
-mod reading;
 mod rebuild;
 mod refusals;
 mod replacing;

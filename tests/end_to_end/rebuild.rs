@@ -1,7 +1,7 @@
 //! Meshes rebuilt from geometry images: watertight, near the input, and refused with the reason where a folder is damaged.
 
-use crate::arrays::array;
 use crate::command::{Built, build, document, program, verify};
+use crate::real_models::arrays::array;
 use affine_atlas::geometry::connectivity::{Connectivity, Topology};
 use affine_atlas::read::{ReadParams, read};
 use std::path::{Path, PathBuf};

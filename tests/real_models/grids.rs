@@ -1,6 +1,6 @@
 //! Grids of a real model by the whole program: few and many cells, and an independent checker of the grid.
 
-use super::lines::array;
+use super::arrays::array;
 use super::{checked_by, comparable};
 use serde_json::Value;
 use std::path::{Path, PathBuf};

@@ -1,9 +1,8 @@
 //! How much of the sharp edges of an atlas are lines of it, from its arrays alone.
 
-use npyz::NpyFile;
+use super::arrays::array;
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
-use std::io::Read;
 use std::path::Path;
 
 /// Least angle between normals, degrees, and fewest edges of a chain, of the input's.
@@ -36,21 +35,6 @@ impl Lines {
             1.0
         }
     }
-}
-
-pub fn array<T: npyz::Deserialize>(atlas: &Path, name: &str) -> Vec<T> {
-    let file = std::fs::File::open(atlas.join("atlas.npz")).expect("atlas.npz");
-    let mut archive = zip::ZipArchive::new(file).expect("a zip file");
-    let mut bytes = Vec::new();
-    let entry = archive.by_name(&format!("{name}.npy"));
-    entry
-        .expect(name)
-        .read_to_end(&mut bytes)
-        .expect("readable");
-    NpyFile::new(&bytes[..])
-        .expect("an array")
-        .into_vec()
-        .expect(name)
 }
 
 fn sub(p: [f64; 3], q: [f64; 3]) -> [f64; 3] {

@@ -3,6 +3,8 @@
 // Not every test binary uses all of it.
 #![allow(dead_code)]
 
+#[path = "../arrays/mod.rs"]
+pub mod arrays;
 pub mod grids;
 pub mod lines;
 pub mod plates;

@@ -173,7 +173,9 @@ impl Builder {
             extensions: None,
             extras: None,
         });
-        let mut json = self.root.to_vec()
+        let mut json = self
+            .root
+            .to_vec()
             .expect("string keys and no custom serialiser, so that serialisation cannot fail");
         json.resize(json.len().next_multiple_of(4), b' ');
         let total = 12 + 8 + json.len() + 8 + self.bytes.len();

@@ -11,8 +11,8 @@ mod reference;
 mod refinement;
 mod stress;
 
-use libtest_mimic::{Failed, Trial};
 use crate::real_models::{CLEAN, LARGE};
+use libtest_mimic::{Failed, Trial};
 use std::path::PathBuf;
 
 pub fn trials() -> Vec<Trial> {
@@ -47,9 +47,11 @@ pub fn trials() -> Vec<Trial> {
         ("fertility.off", 4),
     ] {
         let file = corpus.as_ref().map(|c| c.join(name));
-        trials.push(trial(format!("flow/single-cone/{name}"), file, move |file| {
-            checked::single_cone(&file, genus)
-        }));
+        trials.push(trial(
+            format!("flow/single-cone/{name}"),
+            file,
+            move |file| checked::single_cone(&file, genus),
+        ));
     }
     type Case = fn(&std::path::Path) -> Result<(), String>;
     let stress: [(&str, Case); 3] = [

@@ -1,6 +1,7 @@
 //! Agreement with an independent prototype.
 
 use super::models::Model;
+use crate::real_models::arrays::Npy;
 use std::io::Read;
 use std::path::Path;
 
@@ -29,18 +30,10 @@ pub fn agree(corpus: &Path, reference: &Path) -> Result<(), String> {
             file.read_to_end(&mut bytes).unwrap();
             bytes
         };
-        let floats = |b: Vec<u8>| {
-            npyz::NpyFile::new(&b[..])
-                .unwrap()
-                .into_vec::<f64>()
-                .unwrap()
-        };
+        let floats = |bytes: Vec<u8>| Npy::new(&bytes).numbers::<f64>();
         let (u, curvature) = (floats(array("u")), floats(array("curvature")));
         let cones = array("cones");
-        let cones = npyz::NpyFile::new(&cones[..])
-            .unwrap()
-            .into_vec::<u32>()
-            .unwrap();
+        let cones = Npy::new(&cones).numbers::<u32>();
         let cones: Vec<(usize, f64)> = cones.iter().map(|&v| v as usize).zip(curvature).collect();
         let flat = model
             .flow(&model.prescribe(&cones), 1e-11)
