@@ -23,8 +23,9 @@ mod scale;
 pub mod schemes;
 pub mod seamless;
 pub mod signature;
-pub mod solve;
 pub mod step;
 pub mod straighten;
 pub mod surface_delaunay;
 pub mod vertex_scale;
+
+pub use affine_atlas_solve as solve;

@@ -141,7 +141,7 @@ fn every_array_of_atlas_npz_is_described() {
         ("P", size("quad_positions")),
     ]);
     let charts = document(&built.atlas())["charts"].as_array().map(Vec::len);
-    assert_eq!(charts, Some(counts["C"] as usize));
+    assert_eq!(charts, Some(counts["C"]));
     let text = section("atlas.npz");
     let names: BTreeSet<String> = found.keys().cloned().collect();
     assert_same(&names, &described(&text), "the section atlas.npz");
