@@ -269,7 +269,7 @@ fn parse(bytes: &[u8]) -> Option<Entry> {
     let text = std::str::from_utf8(bytes).ok()?;
     let (entry, hash) = text.strip_suffix('\n')?.rsplit_once('\n')?;
     (blake3::hash(entry.as_bytes()).to_hex().as_str() == hash).then_some(())?;
-    serde_json::from_str(entry).ok()
+    serde_json::from_slice(entry.as_bytes()).ok()
 }
 
 /// Writes the entry of an asset whose folder is in place, built by a plan or not. A result with a failed component leaves none.

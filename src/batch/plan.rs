@@ -47,7 +47,7 @@ pub fn plan_folder(output: &Path, id: &str) -> PathBuf {
 }
 
 /// A line of a plan.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(tag = "record", rename_all = "snake_case")]
 pub enum Line {
     /// The first.
@@ -58,6 +58,31 @@ pub enum Line {
     Asset(Box<PlannedLine>),
     /// The last.
     End(End),
+}
+
+impl Line {
+    /// One line, without its line break. What is derived reads every member into a value that can hold anything first.
+    fn read(bytes: &[u8]) -> serde_json::Result<Self> {
+        #[derive(Deserialize)]
+        struct Tagged {
+            record: Tag,
+        }
+        #[derive(Deserialize)]
+        #[serde(rename_all = "snake_case")]
+        enum Tag {
+            Plan,
+            Configuration,
+            Asset,
+            End,
+        }
+        let Tagged { record } = serde_json::from_slice(bytes)?;
+        Ok(match record {
+            Tag::Plan => Self::Plan(serde_json::from_slice(bytes)?),
+            Tag::Configuration => Self::Configuration(serde_json::from_slice(bytes)?),
+            Tag::Asset => Self::Asset(serde_json::from_slice(bytes)?),
+            Tag::End => Self::End(serde_json::from_slice(bytes)?),
+        })
+    }
 }
 
 /// The first line of a plan.

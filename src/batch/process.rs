@@ -162,8 +162,10 @@ impl Process {
     fn listen(&mut self, to: &Sender<Message>) -> io::Result<()> {
         let task = self.task;
         if let Some(out) = self.child.stdout.take() {
-            let event =
-                move |line: String| Some(Message::Event(task, serde_json::from_str(&line).ok()?));
+            let event = move |line: String| {
+                let event = serde_json::from_slice(line.as_bytes()).ok()?;
+                Some(Message::Event(task, event))
+            };
             forward(out, to.clone(), task, event)?;
             self.open += 1;
         }

@@ -119,7 +119,7 @@ pub fn receive() -> io::Result<Job> {
     let mut line = String::new();
     let mut input = io::BufReader::new(io::stdin());
     input.read_line(&mut line)?;
-    let job: Job = serde_json::from_str(&line)?;
+    let job: Job = serde_json::from_slice(line.as_bytes())?;
     if !limits::die_with(job.parent) {
         return Err(io::Error::other("the process that wants this work is gone"));
     }

@@ -210,7 +210,7 @@ impl Lines<'_> {
         }
         self.number = 1;
         self.hash(&bytes);
-        let header = match serde_json::from_slice(&bytes) {
+        let header = match Line::read(&bytes) {
             Ok(Line::Plan(header)) => header,
             Ok(_) => return Err(no_plan),
             Err(error) => return Err(self.damaged(error)),
@@ -237,7 +237,7 @@ impl Lines<'_> {
             });
         };
         self.number += 1;
-        let line = serde_json::from_slice(&bytes).map_err(|error| self.damaged(error))?;
+        let line = Line::read(&bytes).map_err(|error| self.damaged(error))?;
         if !matches!(line, Line::End(_)) {
             self.hash(&bytes);
         }
