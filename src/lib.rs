@@ -77,6 +77,7 @@ pub mod grid;
 pub mod job;
 pub mod observe;
 pub mod outcome;
+mod parallel;
 pub mod product;
 pub mod read;
 pub mod rebuild;

@@ -28,8 +28,8 @@ use crate::geometry::ids::{FaceId, NONE, VertexVec};
 use crate::geometry::mesh::{
     AttributeKind, CornerAttribute, Mesh, bounding_box, cross, distance, norm, sub,
 };
+use crate::parallel;
 use interpolation::{in_texels, mix, unit};
-use rayon::prelude::*;
 
 /// A model farther from the origin than this many diagonals of its bounding box gets an image origin.
 const FAR_DIAGONALS: f64 = 10.0;
@@ -72,12 +72,9 @@ pub fn sample(
             .iter()
             .find(|a| a.kind == AttributeKind::Normal && a.components == 3),
     };
-    layout
-        .patches
-        .par_iter()
-        .zip(faces)
-        .map(|(patch, faces)| sample_patch(&surface, layout, patch, &faces))
-        .collect()
+    parallel::map(&layout.patches, |i, patch| {
+        sample_patch(&surface, layout, patch, &faces[i])
+    })
 }
 
 struct Surface<'a> {

@@ -17,7 +17,7 @@ use crate::export::ExportError;
 use crate::export::folder::{mark_swept, sweep_stale};
 use crate::export::manifest::Manifest;
 use crate::outcome::{AssetOutcome, AssetState, Failure, FailureKind};
-use rayon::prelude::*;
+use crate::parallel;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -82,8 +82,9 @@ pub fn decide(batch: &Batch<'_>, tasks: &[Task], known: &Manifest) -> Vec<Verdic
         force: batch.force,
         plan: batch.plan,
     };
-    let look = |task: &Task| cache::check(batch.output, task, known.get(&task.id), demand);
-    tasks.par_iter().map(look).collect()
+    parallel::map(tasks, |_, task| {
+        cache::check(batch.output, task, known.get(&task.id), demand)
+    })
 }
 
 /// Does all tasks, each in a process of its own, and writes down in the manifest what became of them. To be called from a thread that

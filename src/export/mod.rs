@@ -39,9 +39,9 @@ pub use shapes::check_shapes;
 
 use crate::atlas::geometry_image::pack_images;
 use crate::observe::part;
+use crate::parallel;
 use crate::product::AffineAtlas;
 use folder::Staging;
-use rayon::prelude::*;
 use std::io;
 
 /// Writes all data files of one component into a staging folder: `atlas.json`, `atlas.npz`,
@@ -99,7 +99,7 @@ fn write_others(
 ) -> Result<(Vec<String>, glb::Surface), ExportError> {
     let part = part!("images");
     // Compression takes most of the time, and images do not depend on each other.
-    let images = (atlas.images.par_iter().enumerate()).map(|(id, image)| {
+    let images = parallel::map(&atlas.images, |id, image| {
         let name = inside(&atlas_json::image_path(id));
         let mut file = staging.create(&name)?;
         let label = exr::label(document, id, provenance);
@@ -108,7 +108,6 @@ fn write_others(
         file.finish()?;
         Ok(name)
     });
-    let images: Vec<Result<String, ExportError>> = images.collect();
     let mut files = images.into_iter().collect::<Result<Vec<_>, _>>()?;
     drop(part);
 

@@ -11,7 +11,7 @@ use super::blocks::{Block, Blocks, Piece, corner, sides};
 use super::error::GridError;
 use super::packing::{Outline, Packed, pack};
 use super::quads::QuadMesh;
-use rayon::prelude::*;
+use crate::parallel;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 /// What part of the rectangle around an island its cells must be: answers that are tried; the last leaves blocks alone.
@@ -248,10 +248,9 @@ pub(super) fn arrange(
         .into_iter()
         .flat_map(|filled| LONGEST.map(|longest| [filled, longest]));
     let answers: Vec<[f64; 2]> = answers.collect();
-    let islands = answers
-        .par_iter()
-        .map(|&[filled, longest]| joined(mesh, blocks, filled, longest));
-    let mut islands: Vec<Vec<Island>> = islands.collect();
+    let mut islands = parallel::map(&answers, |_, &[filled, longest]| {
+        joined(mesh, blocks, filled, longest)
+    });
     islands.sort_by_key(Vec::len);
     islands.dedup_by_key(|islands| islands.len());
     let texels = mesh.quads.len() as f64 * (samples * samples) as f64;

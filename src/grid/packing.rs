@@ -3,7 +3,7 @@
 //! Islands are drawn on a raster as wide as a gutter, each with its gutter; a row of the square is a row of bits, and all places in it are tried at once. Several widths of the square and two orders of the islands are tried. Whole
 //! numbers, so the result is the same everywhere.
 
-use rayon::prelude::*;
+use crate::parallel;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Squares of the raster along a side of the square, about, at most.
@@ -243,7 +243,7 @@ pub(super) fn pack(
         .unwrap_or(unit);
     let mask =
         |o: &Outline| [false, true].map(|is_turned| Mask::new(o, is_turned, samples, gutter, unit));
-    let masks: Vec<[Mask; 2]> = outlines.par_iter().map(mask).collect();
+    let masks = parallel::map(outlines, |_, o| mask(o));
     let area = |i: usize| masks[i][0].area();
     let total: usize = (0..masks.len()).map(area).sum();
     let root = (total as f64).sqrt();
@@ -280,7 +280,7 @@ pub(super) fn pack(
         let before = least.fetch_min(side, Ordering::Relaxed);
         (side <= before).then_some((side, places))
     };
-    let tried: Vec<Option<(usize, Vec<Placed>)>> = jobs.par_iter().map(of).collect();
+    let tried = parallel::map(&jobs, |_, job| of(job));
     let best = tried.into_iter().flatten().min_by_key(|(side, _)| *side);
     let (side, places) = best?;
     Some(Packed {

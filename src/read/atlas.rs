@@ -10,7 +10,7 @@
 use super::bounded::{JSON_LIMIT, is_inside, read_bounded};
 use super::exr::{self, Read};
 use super::npz::Npz;
-use rayon::prelude::*;
+use crate::parallel;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -227,11 +227,8 @@ pub fn component_folders(folder: &Path) -> Result<Vec<PathBuf>, FolderError> {
 /// Files that are missing, damaged, or do not fit each other.
 pub fn read_images(folder: &Path) -> Result<ImageFolder, FolderError> {
     let document = document(&folder.join("atlas.json"))?;
-    let images = document
-        .patches
-        .par_iter()
-        .map(|patch| image(folder, patch))
-        .collect::<Result<_, _>>()?;
+    let images = parallel::map(&document.patches, |_, patch| image(folder, patch));
+    let images = images.into_iter().collect::<Result<_, _>>()?;
     let path = folder.join("atlas.npz");
     let of_file = |problem| FolderError::File {
         path: path.clone(),

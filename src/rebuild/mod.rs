@@ -39,8 +39,8 @@ pub use stored::{rebuild_stored, stored_seams};
 use crate::atlas::geometry_image::GeometryImage;
 use crate::atlas::patches::{Domain, PatchLayout, Seam};
 use crate::geometry::connectivity::Topology;
+use crate::parallel;
 use frame::Frame;
-use rayon::prelude::*;
 
 /// One geometry image.
 #[derive(Clone, Copy, Debug)]
@@ -159,15 +159,10 @@ pub fn rebuild(images: &Images<'_>) -> Result<Rebuilt, RebuildError> {
     let seams = border::checked(images, &frames)?;
     let borders = border::borders(&seams, &frames)?;
     let chains = thin::thin(&seams, &frames, &borders)?;
-    let bands = images
-        .patches
-        .par_iter()
-        .zip(&frames)
-        .enumerate()
-        .map(|(id, (patch, frame))| {
-            let polygon = chain::polygon(&borders.loops[id], &chains);
-            band::triangulate(id, patch, frame, polygon)
-        })
-        .collect::<Result<Vec<_>, _>>()?;
+    let bands = parallel::map(&images.patches, |id, patch| {
+        let polygon = chain::polygon(&borders.loops[id], &chains);
+        band::triangulate(id, patch, &frames[id], polygon)
+    });
+    let bands = bands.into_iter().collect::<Result<Vec<_>, _>>()?;
     stitch::stitch(images, &frames, &borders, &chains, bands)
 }

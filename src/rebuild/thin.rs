@@ -16,7 +16,7 @@ use super::crossing::crossings;
 use super::frame::Frame;
 use crate::atlas::patches::Seam;
 use crate::geometry::polygon::is_counterclockwise;
-use rayon::prelude::*;
+use crate::parallel;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Longest chord, in texels of the finer side.
@@ -36,21 +36,18 @@ pub(super) fn thin<'a>(
     frames: &[Frame],
     borders: &Borders,
 ) -> Result<Vec<Chain<'a>>, RebuildError> {
-    let mut chains: Vec<Chain> = seams
-        .par_iter()
-        .zip(&borders.ends)
-        .map(|(seam, ends)| {
-            let patches = [Some(seam.left), seam.right].into_iter().flatten();
-            let most = patches.map(|p| most_edges(&frames[p.index()]));
-            let mut chain = Chain::new(seam, frames);
-            subdivide(
-                &mut chain,
-                ends[0] == ends[1],
-                most.fold(f64::INFINITY, f64::min),
-            );
-            chain
-        })
-        .collect();
+    let mut chains: Vec<Chain> = parallel::map(seams, |i, seam| {
+        let ends = &borders.ends[i];
+        let patches = [Some(seam.left), seam.right].into_iter().flatten();
+        let most = patches.map(|p| most_edges(&frames[p.index()]));
+        let mut chain = Chain::new(seam, frames);
+        subdivide(
+            &mut chain,
+            ends[0] == ends[1],
+            most.fold(f64::INFINITY, f64::min),
+        );
+        chain
+    });
     part_chords_with_the_same_ends(&mut chains, borders);
     untangle(&mut chains, frames, borders)?;
     Ok(chains)
@@ -136,10 +133,10 @@ fn untangle(chains: &mut [Chain], frames: &[Frame], borders: &Borders) -> Result
     }
     let mut dirty: Vec<usize> = (0..borders.loops.len()).collect();
     while !dirty.is_empty() {
-        let tangled: Vec<Vec<(usize, usize)>> = dirty
-            .par_iter()
-            .map(|&patch| tangled_chords(patch, chains, frames, borders))
-            .collect::<Result<_, _>>()?;
+        let tangled = parallel::map(&dirty, |_, &patch| {
+            tangled_chords(patch, chains, frames, borders)
+        });
+        let tangled = tangled.into_iter().collect::<Result<Vec<_>, _>>()?;
         let mut flagged: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
         for (seam, chord) in tangled.into_iter().flatten() {
             flagged.entry(seam).or_default().insert(chord);

@@ -13,6 +13,7 @@ use super::surface::BSplineSurface;
 use super::tensor::{Vertices, irregular_corners, join_corners, surface};
 use crate::geometry::mesh::{cross, dot, norm};
 use crate::grid::blocks::{Block, Rules, Squares, side_of};
+use crate::parallel;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
@@ -113,24 +114,21 @@ fn halvings(limit: &Limit<'_>, irregular: &[bool], angle: f64) -> u32 {
     let is_met = |v: &usize| irregular[*v] && kinds[*v] != Kind::Corner;
     let points = (0..irregular.len()).filter(is_met);
     let points: Vec<CellSide> = points.filter_map(|v| leaving[v]).collect();
-    let mut needed: Vec<[u32; 2]> = points
-        .par_iter()
-        .map(|&side| {
-            let mut needed = [MOST_HALVINGS; 2];
-            for d in LEAST_HALVINGS..MOST_HALVINGS {
-                let jump = jump_at(limit, side, d);
-                for (needed, most) in needed.iter_mut().zip([angle, ELSEWHERE * angle]) {
-                    if jump < most {
-                        *needed = d.min(*needed);
-                    }
-                }
-                if jump < angle {
-                    break;
+    let mut needed = parallel::map(&points, |_, &side| {
+        let mut needed = [MOST_HALVINGS; 2];
+        for d in LEAST_HALVINGS..MOST_HALVINGS {
+            let jump = jump_at(limit, side, d);
+            for (needed, most) in needed.iter_mut().zip([angle, ELSEWHERE * angle]) {
+                if jump < most {
+                    *needed = d.min(*needed);
                 }
             }
-            needed
-        })
-        .collect();
+            if jump < angle {
+                break;
+            }
+        }
+        needed
+    });
     needed.sort_unstable();
     let most = needed.iter().map(|n| n[1]).max().unwrap_or(LEAST_HALVINGS);
     let usual = needed
@@ -189,7 +187,7 @@ pub fn faces(limit: &Limit<'_>, most_jump: f64) -> Result<Faces, SplineError> {
         let corners = irregular_corners(cage, block, &irregular);
         face(limit, block, corners, halvings)
     };
-    let surfaces = blocks.par_iter().map(face).collect();
+    let surfaces = parallel::map(&blocks, |_, block| face(block));
     Ok(joined(cage, &irregular, &blocks, surfaces, halvings))
 }
 

@@ -11,6 +11,7 @@ use super::limit::{Limit, Place};
 use super::measure::shape;
 use crate::flow::solve::SymmetricSolver;
 use crate::geometry::mesh::{norm, sub};
+use crate::parallel;
 use rayon::prelude::*;
 
 /// Weight of squares of second differences beside those of distances.
@@ -96,13 +97,10 @@ impl<'a> Fitter<'a> {
             order[*at] = i as u32;
             *at += 1;
         }
-        let blocks: Vec<Block> = (0..cells as u32)
-            .into_par_iter()
-            .map(|cell| {
-                let own = &order[first[cell as usize]..first[cell as usize + 1]];
-                self.block(cell, own.iter().map(|&i| &samples[i as usize]))
-            })
-            .collect();
+        let blocks: Vec<Block> = parallel::map_numbers(cells, |cell| {
+            let own = &order[first[cell]..first[cell + 1]];
+            self.block(cell as u32, own.iter().map(|&i| &samples[i as usize]))
+        });
         let size = self.cage.vertices;
         let area: f64 = samples.iter().map(|s| s.area).sum();
         let fair = FAIR * area / size as f64;

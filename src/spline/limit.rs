@@ -4,7 +4,7 @@ use super::cage::{Cage, CellSide};
 use super::evaluator::{Evaluator, Piece};
 use super::surface::Jet;
 use crate::geometry::mesh::{cross, dot, norm, sub};
-use rayon::prelude::*;
+use crate::parallel;
 
 /// A surface.
 pub struct Limit<'a> {
@@ -44,12 +44,9 @@ const BESIDE: f64 = 1e-4;
 impl<'a> Limit<'a> {
     /// The surface of a control mesh.
     pub fn new(cage: &'a Cage, evaluator: &'a Evaluator, control: &'a [[f64; 3]]) -> Self {
-        let cells = 0..cage.cells.len() as u32;
-        let pieces = cells
-            .into_par_iter()
-            .map(|c| evaluator.pieces(control, c, PIECES_DEPTH));
+        let of_cell = |c| evaluator.pieces(control, c as u32, PIECES_DEPTH);
         Self {
-            pieces: pieces.collect(),
+            pieces: parallel::map_numbers(cage.cells.len(), of_cell),
             cage,
             evaluator,
             control,

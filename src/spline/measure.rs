@@ -5,6 +5,7 @@
 use super::gridded::Sample;
 use super::limit::Limit;
 use crate::geometry::mesh::{cross, dot, norm, sub};
+use crate::parallel;
 use rayon::prelude::*;
 
 /// Distances and angles from samples of the source to the nearest places that were found on the surface.
@@ -80,11 +81,8 @@ const AWAY: f64 = 0.05;
 
 /// Looks for folds, and lists the cells in which there are some. `samples`: of the source.
 pub fn shape(limit: &Limit<'_>, samples: &[Sample]) -> (Shape, Vec<u32>) {
-    let cells = 0..limit.cage.cells.len() as u32;
-    let each: Vec<Cell> = cells
-        .into_par_iter()
-        .map(|cell| Cell::new(limit, cell))
-        .collect();
+    let cells = limit.cage.cells.len();
+    let each = parallel::map_numbers(cells, |cell| Cell::new(limit, cell as u32));
     let mut source = vec![[0.0; 2]; each.len()];
     for sample in samples.iter().filter(|s| each[s.cell as usize].away > 0.0) {
         let [away, all] = &mut source[sample.cell as usize];

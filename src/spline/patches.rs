@@ -14,7 +14,7 @@ use super::limit::Limit;
 use super::surface::BSplineSurface;
 use super::tensor::{irregular_corners, join_corners, surface};
 use crate::grid::blocks::{Block, Blocks, Piece, Rules, Squares, side_of};
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Patches and how they hang together.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,13 +58,10 @@ pub fn patches(limit: &Limit<'_>) -> Result<Patches, SplineError> {
     let cage = limit.cage;
     let irregular = cage.irregular();
     let Blocks { blocks, sides } = blocks(cage, &irregular)?;
-    let mut surfaces: Vec<BSplineSurface> = blocks
-        .par_iter()
-        .map(|block| {
-            let corners = irregular_corners(cage, block, &irregular);
-            surface(limit, block, corners, block.cells.map(breaks))
-        })
-        .collect();
+    let mut surfaces = parallel::map(&blocks, |_, block| {
+        let corners = irregular_corners(cage, block, &irregular);
+        surface(limit, block, corners, block.cells.map(breaks))
+    });
     join_corners(cage, &blocks, &mut surfaces);
     let mut patches = Patches {
         surfaces,

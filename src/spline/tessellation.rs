@@ -6,7 +6,7 @@ use super::cage::{Cage, CellSide};
 use super::evaluator::CORNER;
 use super::limit::Limit;
 use crate::geometry::mesh::{cross, dot, norm, sub};
-use rayon::prelude::*;
+use crate::parallel;
 use rustc_hash::FxHashMap;
 
 /// Triangles on the surface.
@@ -70,10 +70,10 @@ pub fn tessellate(limit: &Limit<'_>, parts: usize) -> Tessellation {
     let sectors = sectors(cage);
     let row = parts + 1;
     let place = |i: usize| [(i % row) as f64, (i / row) as f64].map(|x| x / parts as f64);
-    let jets: Vec<Vec<([f64; 3], [f64; 3])>> = (0..cage.cells.len() as u32)
-        .into_par_iter()
-        .map(|c| (0..row * row).map(|i| limit.normal(c, place(i))).collect())
-        .collect();
+    let jets: Vec<Vec<([f64; 3], [f64; 3])>> = parallel::map_numbers(cage.cells.len(), |c| {
+        let places = (0..row * row).map(place);
+        places.map(|at| limit.normal(c as u32, at)).collect()
+    });
     let mut out = Tessellation {
         parts,
         ..Tessellation::default()

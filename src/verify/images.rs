@@ -7,8 +7,8 @@ use super::document::{Document, Patch};
 use super::formulas::{Point2, Point3, Worst, diagonal3, distance2, mix3, norm3};
 use super::patches::Groups;
 use super::sides::{self, Sides};
+use crate::parallel;
 use crate::read::exr::{self, Image, Read};
-use rayon::prelude::*;
 use std::path::Path;
 
 /// Largest distance between a texel and the surface point, in diagonals of the surface.
@@ -50,34 +50,30 @@ pub(super) fn check(
     verdicts: &mut Verdicts,
 ) {
     let size = diagonal3(&arrays.positions);
-    let mut tallies: Vec<Tally> = document
-        .patches
-        .par_iter()
-        .map(|patch| {
-            let mut tally = Tally::default();
-            match read(&folder.join(&patch.image), patch, &mut tally) {
-                Ok(Some(image)) => {
-                    if document.is_generated()
-                        && let Some(what) = channels::lacking(&image, &document.images)
-                    {
-                        tally.layout.get_or_insert(what);
-                    }
-                    tally.infinite += channels::infinite(&image);
-                    tally.wrong_source_normal =
-                        channels::wrong_source_normals(&image, &document.images, patch);
-                    tally.text = check_text(image.text.as_deref(), patch, document);
-                    if patch.domain == "grid" {
-                        tally.sides = Some(sides::sides(&image, patch));
-                    }
-                    let faces = groups.of(patch.id);
-                    Raster::new(arrays, document, patch, faces, size).compare(&image, &mut tally);
+    let mut tallies = parallel::map(&document.patches, |_, patch| {
+        let mut tally = Tally::default();
+        match read(&folder.join(&patch.image), patch, &mut tally) {
+            Ok(Some(image)) => {
+                if document.is_generated()
+                    && let Some(what) = channels::lacking(&image, &document.images)
+                {
+                    tally.layout.get_or_insert(what);
                 }
-                Ok(None) => {}
-                Err(error) => tally.unreadable = Some(error),
+                tally.infinite += channels::infinite(&image);
+                tally.wrong_source_normal =
+                    channels::wrong_source_normals(&image, &document.images, patch);
+                tally.text = check_text(image.text.as_deref(), patch, document);
+                if patch.domain == "grid" {
+                    tally.sides = Some(sides::sides(&image, patch));
+                }
+                let faces = groups.of(patch.id);
+                Raster::new(arrays, document, patch, faces, size).compare(&image, &mut tally);
             }
-            tally
-        })
-        .collect();
+            Ok(None) => {}
+            Err(error) => tally.unreadable = Some(error),
+        }
+        tally
+    });
     report(document, &tallies, verdicts);
     let read: Vec<Option<Sides>> = tallies.iter_mut().map(|t| t.sides.take()).collect();
     sides::check(document, &read, verdicts);

@@ -8,6 +8,7 @@ use super::grid::Grid;
 use super::shapes::Shapes;
 use super::surface::{Surface, UnionFind};
 use super::{Verdicts, VerifyOptions, border};
+use crate::parallel;
 use rayon::prelude::*;
 
 /// Faces overlap where they share more than this, in diameters of the patch.
@@ -95,11 +96,9 @@ pub(super) fn check(
         format!("{empty} empty"),
     );
     check_inside(surface, arrays, document, &groups, options, verdicts);
-    let measured: Vec<Measured> = document
-        .patches
-        .par_iter()
-        .map(|patch| measure(surface, arrays, patch, groups.of(patch.id), shapes, slit))
-        .collect();
+    let measured: Vec<Measured> = parallel::map(&document.patches, |_, patch| {
+        measure(surface, arrays, patch, groups.of(patch.id), shapes, slit)
+    });
     let mut shape = Worst::default();
     let mut range = Worst::default();
     let mut overlapping = Vec::new();

@@ -9,6 +9,7 @@ use super::formulas::{
 use super::grid::Grid;
 use super::patches::{Groups, extent};
 use super::surface::Surface;
+use crate::parallel;
 use rayon::prelude::*;
 
 /// A border edge of a patch: planar and spatial ends.
@@ -120,29 +121,26 @@ pub(super) fn check(
         );
     }
     let size = diagonal3(&arrays.positions);
-    let tallies: Vec<(usize, usize, Worst)> = (0..arrays.seam_patch.len())
-        .into_par_iter()
-        .map(|seam| {
-            let (mut off, mut ill) = (0, 0);
-            let mut worst = Worst::default();
-            for sample in arrays.seam_range(seam) {
-                for side in 0..2 {
-                    let uv = arrays.seam_uv[sample][side];
-                    let patch = arrays.seam_patch[seam][side];
-                    let is_nan = uv.iter().all(|x| x.is_nan());
-                    if patch == NONE {
-                        ill += usize::from(!is_nan);
-                        continue;
-                    }
-                    ill += usize::from(!uv.iter().all(|x| x.is_finite()));
-                    let gap = borders[patch as usize].distance(uv, arrays.seam_position[sample]);
-                    off += usize::from(gap > 1e-6 * size);
-                    worst.see(gap / size);
+    let tallies = parallel::map_numbers(arrays.seam_patch.len(), |seam| {
+        let (mut off, mut ill) = (0, 0);
+        let mut worst = Worst::default();
+        for sample in arrays.seam_range(seam) {
+            for side in 0..2 {
+                let uv = arrays.seam_uv[sample][side];
+                let patch = arrays.seam_patch[seam][side];
+                let is_nan = uv.iter().all(|x| x.is_nan());
+                if patch == NONE {
+                    ill += usize::from(!is_nan);
+                    continue;
                 }
+                ill += usize::from(!uv.iter().all(|x| x.is_finite()));
+                let gap = borders[patch as usize].distance(uv, arrays.seam_position[sample]);
+                off += usize::from(gap > 1e-6 * size);
+                worst.see(gap / size);
             }
-            (off, ill, worst)
-        })
-        .collect();
+        }
+        (off, ill, worst)
+    });
     let (mut off, mut ill, mut worst) = (0, 0, Worst::default());
     for tally in tallies {
         off += tally.0;

@@ -3,7 +3,7 @@
 use super::figures::{self, Figures};
 use super::history::Past;
 use crate::export::manifest::{Manifest, Record, State};
-use rayon::prelude::*;
+use crate::parallel;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -36,7 +36,7 @@ pub(super) fn collect<'a>(
     before: &BTreeMap<String, Past>,
 ) -> Vec<Asset<'a>> {
     let records: Vec<&Record> = manifest.records().collect();
-    let assets = records.into_par_iter().map(|record| {
+    parallel::map(&records, |_, &record| {
         let known = before.get(&record.id).filter(|past| {
             record.state == State::Cached
                 && matches!(past.state, State::Built | State::Cached)
@@ -47,6 +47,5 @@ pub(super) fn collect<'a>(
             .and_then(|past| past.figures.clone())
             .or_else(|| figures::read(output_root, record));
         Asset { record, figures }
-    });
-    assets.collect()
+    })
 }

@@ -2,7 +2,7 @@
 
 use super::raster::{Band, NOTHING, sparse};
 use crate::geometry::mesh::{bounding_box, cross, distance, dot, norm, sub};
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Vectors in space.
 pub type Vec3 = [f64; 3];
@@ -145,8 +145,9 @@ pub fn choose_direction(positions: &[Vec3], faces: &[[u32; 3]]) -> Vec3 {
         [cosine * x, sine, cosine * z]
     };
     let scored = |views: Vec<(usize, usize)>| -> Vec<(f64, (usize, usize))> {
-        let score = |view| (score(candidate(view), positions, faces), view);
-        views.into_par_iter().map(score).collect()
+        parallel::map(&views, |_, &view| {
+            (score(candidate(view), positions, faces), view)
+        })
     };
     let mut tried = scored((0..TURNS).map(|turn| (turn, 0)).collect());
     // Of equally good ones the first.

@@ -16,6 +16,7 @@
 mod boxes;
 
 use crate::geometry::mesh::{cross, norm, sub, triangle_area};
+use crate::parallel;
 use boxes::BoxTree;
 use rayon::prelude::*;
 
@@ -115,13 +116,10 @@ fn one_sided(
         return None;
     }
     let samples = sampling.samples.max(1);
-    let runs: Vec<OneSided> = (0..samples.div_ceil(RUN))
-        .into_par_iter()
-        .map(|run| {
-            let range = run * RUN..samples.min((run + 1) * RUN);
-            sample_run(surface, other, &up_to, range, samples)
-        })
-        .collect();
+    let runs = parallel::map_numbers(samples.div_ceil(RUN), |run| {
+        let range = run * RUN..samples.min((run + 1) * RUN);
+        sample_run(surface, other, &up_to, range, samples)
+    });
     let step = surface
         .positions
         .len()

@@ -4,7 +4,7 @@ use super::PositionsError;
 use crate::flow::correspondence::Curves;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeId, HalfedgeId};
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Crossings of every edge of a triangulation, in order from the tail of its `edge_halfedge`.
 pub(super) struct Crossed {
@@ -64,17 +64,14 @@ pub(super) fn gather<T: Send, S>(
     work: impl Fn(usize, &mut S, &mut Vec<T>) -> Result<(), PositionsError> + Sync,
 ) -> Result<Vec<T>, PositionsError> {
     const BLOCK: usize = 2048;
-    let blocks = (0..count.div_ceil(BLOCK))
-        .into_par_iter()
-        .map(|block| {
-            let mut found = Vec::new();
-            let mut scratch = scratch();
-            for item in block * BLOCK..count.min((block + 1) * BLOCK) {
-                work(item, &mut scratch, &mut found)?;
-            }
-            Ok(found)
-        })
-        .collect::<Vec<Result<Vec<T>, PositionsError>>>();
+    let blocks = parallel::map_numbers(count.div_ceil(BLOCK), |block| {
+        let mut found = Vec::new();
+        let mut scratch = scratch();
+        for item in block * BLOCK..count.min((block + 1) * BLOCK) {
+            work(item, &mut scratch, &mut found)?;
+        }
+        Ok::<_, PositionsError>(found)
+    });
     let mut all = Vec::new();
     for block in blocks {
         all.append(&mut block?);
