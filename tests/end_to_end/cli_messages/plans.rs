@@ -89,7 +89,8 @@ fn plans_that_are_none_are_refused() {
     help: copy it again, or plan again: what is built is not built again
     ");
     insta::assert_snapshot!(changed("\"cost\":0", "\"cost\":-1"), @r"
-    error: line 4 of the plan p.jsonl is damaged: invalid value: integer `-1`, expected u64
+    error: line 4 of the plan p.jsonl is damaged: invalid value: integer `-1`, expected u64 at
+    | column 314
     help: copy it again, or plan again: what is built is not built again
     ");
     let other = changed("\"given\":\"b.obj\"", "\"given\":\"c.obj\"");
