@@ -23,8 +23,10 @@ use super::sets::{Sets, in_order};
 use super::slit::Slit;
 use crate::atlas::plane::wrap_angle;
 use crate::geometry::ids::{FaceId, FaceVec};
+use crate::parallel;
 use rayon::prelude::*;
 use std::cmp::Reverse;
+use std::sync::{Mutex, PoisonError};
 
 /// Decibels that each patch more must gain.
 const LEAST_GAIN: f64 = 0.015;
@@ -52,10 +54,12 @@ pub(super) struct Divider<'a> {
     /// What a shorter side may ask for on the longer one.
     enough: f64,
     params: &'a PatchParams,
+    /// Spaces that nobody works in at the moment: each is as large as the surface, and most patches are small.
+    idle: Mutex<Vec<Scratch<'a>>>,
 }
 
-/// Space to work in, for one patch at a time. What is not touched takes no memory.
-pub(super) struct Scratch<'a> {
+/// Space to work in, for one patch at a time.
+struct Scratch<'a> {
     sets: Sets<'a>,
     /// Of [`Divider::by_creases`].
     label: FaceVec<u32>,
@@ -64,7 +68,7 @@ pub(super) struct Scratch<'a> {
 }
 
 impl<'a> Scratch<'a> {
-    pub fn new(slit: &'a Slit<'a>) -> Self {
+    fn new(slit: &'a Slit<'a>) -> Self {
         Self {
             sets: Sets::new(slit),
             label: FaceVec::filled(0, slit.connectivity.face_count()),
@@ -90,14 +94,24 @@ impl<'a> Divider<'a> {
             budget: Budget::default(),
             enough: f64::INFINITY,
             params,
+            idle: Mutex::default(),
         }
+    }
+
+    fn with_scratch<T>(&self, work: impl FnOnce(&mut Scratch<'a>) -> T) -> T {
+        let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = idle().pop();
+        let mut scratch = found.unwrap_or_else(|| Scratch::new(self.slit));
+        let result = work(&mut scratch);
+        idle().push(scratch);
+        result
     }
 
     /// Areas and bend of patches.
     pub fn sums(&self, patches: &[Vec<FaceId>]) -> Vec<Sums> {
-        let of = |sets: &mut Sets<'a>, faces: &Vec<FaceId>| self.sums_and_border(faces, sets).0;
-        let rows = patches.par_iter();
-        rows.map_init(|| Sets::new(self.slit), of).collect()
+        parallel::map(patches, |_, faces| {
+            self.with_scratch(|scratch| self.sums_and_border(faces, &mut scratch.sets).0)
+        })
     }
 
     /// Finds what a texel is worth where the images are these, and their cost together.
@@ -108,9 +122,9 @@ impl<'a> Divider<'a> {
             let placement = self.placed(faces, &border, sets, own);
             self.outline(sums, &border, &placement).demand
         };
-        let rows = patches.par_iter();
-        let demands = rows.map_init(|| Scratch::new(self.slit), demand);
-        let demands: Vec<Demand> = demands.collect();
+        let demands: Vec<Demand> = parallel::map(patches, |_, faces| {
+            self.with_scratch(|scratch| demand(scratch, faces))
+        });
         self.enough = enough_long_side(demands.iter().map(shape), self.params);
         let coarsest = |d| coarsest(d, self.enough, self.params);
         let least: Vec<f64> = demands.iter().map(coarsest).collect();
@@ -156,9 +170,9 @@ impl<'a> Divider<'a> {
 
     /// How patches are best divided.
     fn best_divisions(&self, patches: Vec<Vec<FaceId>>) -> Vec<Row> {
-        let best = |scratch: &mut Scratch<'a>, faces| self.best_division(faces, scratch);
         let rows = patches.into_par_iter().with_max_len(1);
-        rows.map_init(|| Scratch::new(self.slit), best).collect()
+        rows.map(|faces| self.with_scratch(|scratch| self.best_division(faces, scratch)))
+            .collect()
     }
 
     /// Coordinates of a patch with its border.
