@@ -333,6 +333,8 @@ pub(super) fn read(folder: &Path, verdicts: &mut Verdicts) -> Option<Document> {
     if !complete {
         return None;
     }
+    // Of very many patches the tree of values is large.
+    drop(value);
     let document: Document = match serde_json::from_slice(&bytes) {
         Ok(document) => document,
         Err(error) => {
