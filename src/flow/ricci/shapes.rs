@@ -333,10 +333,11 @@ pub(crate) fn corpus() -> Vec<Shape> {
     models
 }
 
-/// The large models.
+/// The large models, which must be there.
 pub(crate) fn large_models() -> Vec<Shape> {
     let mut models = models();
     models.retain(|shape| shape.connectivity.face_count() > MOST_FACES);
+    assert!(!models.is_empty(), "AFFINE_ATLAS_CORPUS names none");
     models
 }
 

@@ -590,9 +590,7 @@ fn corpus_rocker_arm_has_its_known_area_distortion() {
 #[test]
 #[ignore = "long"]
 fn corpus_gradient_flow_is_a_straight_line() {
-    let Some(shape) = shapes::corpus_model("spot.obj") else {
-        return;
-    };
+    let shape = shapes::corpus_model("spot.obj").expect("AFFINE_ATLAS_CORPUS names a folder");
     let prescription = shape.prescribe_default();
     // 40 000 steps; vertex scaling, tried by hand, takes 80 000 and shows the same.
     let newton = run(&shape, &prescription, Scheme::Tangential).unwrap();
