@@ -11,7 +11,7 @@
 
 use super::density::Units;
 use super::error::GridError;
-use super::map::{Corners, Freedom, GridMap, double_area};
+use super::map::{Corners, Freedom, GridMap, Turning, double_area};
 use super::quads::QuadMesh;
 use super::squares::Squares;
 use super::system::{Derivatives, Equations};
@@ -223,7 +223,10 @@ pub(super) fn unfold(
         let places: Vec<[f64; 2]> = vertices.map(|v| map.place(v)).collect();
         let step = follow(map, mesh, &squares, &spots, &step);
         let moved = without_harm(map, &seen_from, &places, &step, length);
-        seen_from.put(map, &moved);
+        let before_step = map.anchors.clone();
+        let mut turning = Turning::new(map);
+        turning.see(&seen_from, &moved);
+        turning.put(map, &seen_from, &moved);
         let found = locate(map, mesh, &normals, unit);
         let there = found.as_ref().map_or(f64::INFINITY, |(_, spots)| {
             energy(&cells, spots, &|_| [0.0; 2])
@@ -236,6 +239,7 @@ pub(super) fn unfold(
                 unfolded.extend(vertices.filter(|(_, s)| **s != [0.0; 2]).map(|(v, _)| v));
             }
             _ => {
+                map.anchors = before_step;
                 seen_from.put(map, &places);
                 return Ok(unfolded);
             }

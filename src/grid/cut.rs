@@ -6,12 +6,12 @@
 use super::blocks::Blocks;
 use super::cells::unfold;
 use super::density::Units;
-use super::dirichlet;
 use super::error::GridError;
 use super::map::{Anchor, Corners, Freedom, GridMap, is_turned_over};
 use super::quads::QuadMesh;
 use super::sheet::Aim;
 use super::slivers::thicken;
+use super::{energy, relax};
 use crate::geometry::ids::{FaceId, HalfedgeId, NONE, VertexId};
 use std::collections::{BTreeSet, VecDeque};
 use std::f64::consts::FRAC_PI_2;
@@ -237,14 +237,14 @@ fn relax_drawn(
     // New ones beside those that moved.
     let around = unfolded.iter().flat_map(|&v| c.outgoing(v));
     kept.extend(around.map(|h| c.head(h)));
-    for (f, _) in dirichlet::densities(map, unit).filter(|(_, density)| *density > SQUEEZED) {
+    for (f, _) in energy::densities(map, unit).filter(|(_, density)| *density > SQUEEZED) {
         c.face_vertices(f).iter().for_each(|v| {
             kept.remove(v);
         });
     }
     let freedom = map.freedom.clone();
     kept.iter().for_each(|&v| map.freedom[v] = Freedom::Fixed);
-    let relaxed = dirichlet::relax(map, unit);
+    let relaxed = relax::relax(map, unit);
     map.freedom = freedom;
     relaxed.map(|_| ())
 }

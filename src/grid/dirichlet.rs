@@ -1,56 +1,26 @@
-//! The map of least distortion that is one to one: Newton's method on the symmetric Dirichlet energy.
+//! The symmetric Dirichlet energy of one face, area (‖J‖² + ‖J⁻¹‖²), where J takes the surface, lengths in cells, to the grid.
 //!
-//! *Enters:* a [`GridMap`] without a face turned over. *Leaves:* the same with moved vertices: Σ area (‖J‖² + ‖J⁻¹‖²) over the faces is (nearly) least, where J takes the surface, lengths in cells, to the grid.
-//! *Guaranteed:* every face keeps a positive area at every step, since the energy is infinite where one loses it; cones stay, lines stay on their lattice lines; the same for any number of threads. *Not guaranteed:* the
-//! least of all maps: it is a local minimum.
-//!
-//! The Hessian of a face is made positive semidefinite by its eigenvalues, known in closed form (Smith, de Goes, Kim 2019); steps end before the first face loses its area (Smith, Schaefer 2015).
+//! Its Hessian is made positive semidefinite by its eigenvalues, known in closed form (Smith, de Goes, Kim 2019).
 
-use super::complex::turned;
-use super::density::Units;
-use super::error::GridError;
-use super::map::{Corners, Freedom, GridMap, double_area, is_turned_over};
-use super::system::{Derivatives, Equations};
-use crate::geometry::ids::FaceId;
-use crate::observe::part;
-use rayon::prelude::*;
+use super::map::double_area;
+use super::system::Derivatives;
 
-/// Most steps.
-const MOST_STEPS: usize = 40;
-/// It ends where a step lowers the energy by less than this part.
-const LEAST_GAIN: f64 = 1e-4;
-/// Part of the way to where a face loses its area.
-const BEFORE_FLAT: f64 = 0.9;
-/// Part of the decrease that the gradient promises (Armijo).
-const SUFFICIENT: f64 = 1e-4;
-const MOST_HALVINGS: usize = 30;
 /// Faces whose height in space is less than this part of their longest side are slivers, where edges of two triangulations nearly meet. They say nothing about the shape of the surface:
 /// the energy is to keep them as they are at first.
 const SLIVER: f64 = 1e-4;
-/// Faces a piece of work has at least.
-const PIECE: usize = 1024;
 
 /// A face in space, laid into a plane.
 #[derive(Clone, Copy)]
-struct Rest {
+pub(super) struct Rest {
     /// Area, cells.
-    area: f64,
+    pub area: f64,
     /// Takes edges (p₁ − p₀, p₂ − p₀) on the grid to J: J = D · inverse.
     inverse: [[f64; 2]; 2],
 }
 
-/// What came of it.
-#[derive(Clone, Copy, Debug)]
-pub struct Relaxed {
-    /// Steps.
-    pub steps: usize,
-    /// Mean of ‖J‖² + ‖J⁻¹‖² before and after, 4 for an isometry.
-    pub energy: [f64; 2],
-}
-
 impl Rest {
     /// `p` in space, `unit` long where it is 1 here; a sliver is as on the grid.
-    fn new(p: [[f64; 3]; 3], unit: f64, on_grid: [[f64; 2]; 3]) -> Self {
+    pub fn new(p: [[f64; 3]; 3], unit: f64, on_grid: [[f64; 2]; 3]) -> Self {
         let rest = Self::of(p.map(|x| x.map(|x| x / unit)));
         rest.unwrap_or_else(|| {
             let flat = Self::of(on_grid.map(|[x, y]| [x, y, 0.0]));
@@ -96,7 +66,7 @@ impl Rest {
         std::array::from_fn(|i| std::array::from_fn(|j| d[i][0] * b[0][j] + d[i][1] * b[1][j]))
     }
 
-    fn energy(&self, corners: [[f64; 2]; 3]) -> f64 {
+    pub fn energy(&self, corners: [[f64; 2]; 3]) -> f64 {
         let j = self.jacobian(corners);
         let determinant = j[0][0] * j[1][1] - j[0][1] * j[1][0];
         let squared: f64 = j.iter().flatten().map(|x| x * x).sum();
@@ -107,7 +77,7 @@ impl Rest {
     }
 
     /// Gradient and positive semidefinite Hessian by the six coordinates of the corners.
-    fn derivatives(&self, corners: [[f64; 2]; 3]) -> Derivatives {
+    pub fn derivatives(&self, corners: [[f64; 2]; 3]) -> Derivatives {
         let j = self.jacobian(corners);
         // J = U Σ Vᵀ with rotations U and V by angles α and β: singular values and both α − β and α + β by half sums and differences.
         let (e, f) = (0.5 * (j[0][0] + j[1][1]), 0.5 * (j[0][0] - j[1][1]));
@@ -175,69 +145,8 @@ impl Rest {
     }
 }
 
-/// Faces of which a vertex may move: the energy of the others is what it is.
-struct Problem {
-    faces: Vec<(FaceId, Rest)>,
-    corners: Corners,
-    /// Energy of the others, and the area of all.
-    others: f64,
-    total: f64,
-}
-
-impl Problem {
-    fn new(map: &GridMap, unit: &Units) -> Self {
-        let c = &map.sheet.fine.connectivity;
-        let (mut faces, mut others, mut total) = (Vec::new(), 0.0, 0.0);
-        for f in c.faces() {
-            let rest = rest(map, unit, f);
-            total += rest.area;
-            match c
-                .face_vertices(f)
-                .iter()
-                .all(|&v| map.freedom[v] == Freedom::Fixed)
-            {
-                true => others += rest.energy(map.corners(f)),
-                false => faces.push((f, rest)),
-            }
-        }
-        Self {
-            faces,
-            corners: Corners::new(map),
-            others,
-            total,
-        }
-    }
-
-    /// Infinite where a face has no area.
-    fn energy(&self, place: &[[f64; 2]]) -> f64 {
-        let of_face = self.faces.par_iter().with_min_len(PIECE);
-        let energies: Vec<f64> = of_face
-            .map(|(f, rest)| rest.energy(self.corners.corners(*f, place)))
-            .collect();
-        self.others + energies.iter().sum::<f64>()
-    }
-
-    /// How far all vertices may go along `step` before a face has no area, at most 1 / [`BEFORE_FLAT`] steps.
-    fn longest(&self, place: &[[f64; 2]], step: &[[f64; 2]]) -> f64 {
-        let of_face = self.faces.par_iter().with_min_len(PIECE);
-        let longest = of_face.map(|&(f, _)| {
-            let (vertices, turns) = (self.corners.vertices(f), self.corners.turns(f));
-            let d = [0, 1, 2].map(|k| turned(step[vertices[k] as usize], turns[k]));
-            first_root(self.corners.corners(f, place), d)
-        });
-        longest.reduce(|| f64::INFINITY, f64::min)
-    }
-
-    /// Derivatives of a face at given places, in the frame of each vertex.
-    fn derivatives(&self, i: usize, place: &[[f64; 2]]) -> Derivatives {
-        let (f, rest) = &self.faces[i];
-        let (g, h) = rest.derivatives(self.corners.corners(*f, place));
-        turned_back(&g, &h, self.corners.turns(*f))
-    }
-}
-
 /// The least positive t at which the triangle p + t d has no area.
-fn first_root(p: [[f64; 2]; 3], d: [[f64; 2]; 3]) -> f64 {
+pub(super) fn first_root(p: [[f64; 2]; 3], d: [[f64; 2]; 3]) -> f64 {
     let edge = |x: [[f64; 2]; 3], k: usize| [x[k][0] - x[0][0], x[k][1] - x[0][1]];
     let cross = super::complex::cross;
     let (a, b, u, v) = (edge(p, 1), edge(p, 2), edge(d, 1), edge(d, 2));
@@ -254,80 +163,8 @@ fn first_root(p: [[f64; 2]; 3], d: [[f64; 2]; 3]) -> f64 {
     positive.fold(f64::INFINITY, f64::min)
 }
 
-fn rest(map: &GridMap, unit: &Units, f: FaceId) -> Rest {
-    let fine = &map.sheet.fine;
-    let in_space = fine.connectivity.face_vertices(f).map(|v| fine.position[v]);
-    Rest::new(in_space, unit.of(fine.parent[f]), map.corners(f))
-}
-
-/// ‖J‖² + ‖J⁻¹‖² of every face.
-pub(super) fn densities(map: &GridMap, unit: &Units) -> impl Iterator<Item = (FaceId, f64)> {
-    map.sheet.fine.connectivity.faces().map(|f| {
-        let rest = rest(map, unit, f);
-        (f, rest.energy(map.corners(f)) / rest.area)
-    })
-}
-
-/// Moves vertices until the energy is least; see the module docs.
-pub(crate) fn relax(map: &mut GridMap, unit: &Units) -> Result<Relaxed, GridError> {
-    let _part = part!("relax");
-    let c = &map.sheet.fine.connectivity;
-    let mut place: Vec<[f64; 2]> = c.vertices().map(|v| map.place(v)).collect();
-    let problem = Problem::new(map, unit);
-    let total = problem.total;
-    let first = problem.energy(&place);
-    if !first.is_finite() {
-        let flat = |f: &FaceId| problem.corners.corners(*f, &place);
-        let over: Vec<FaceId> = c.faces().filter(|f| is_turned_over(flat(f))).collect();
-        let face = over.first().copied().unwrap_or(FaceId::new(0));
-        let count = over.len();
-        return Err(GridError::TurnedOver { count, face });
-    }
-    let triples = problem
-        .faces
-        .iter()
-        .map(|(f, _)| problem.corners.vertices(*f));
-    let is_free: Vec<[bool; 2]> = map.freedom.iter().map(|f| f.axes()).collect();
-    let may_move: Vec<bool> = is_free.iter().map(|axes| *axes != [false; 2]).collect();
-    let mut equations = Equations::new(triples, &may_move)?;
-    let (mut energy, mut steps) = (first, 0);
-    while steps < MOST_STEPS {
-        equations.sum(|i| problem.derivatives(i, &place), |v| is_free[v]);
-        let (step, slope) = equations.newton_step()?;
-        let _part = part!("line search");
-        let mut length = (BEFORE_FLAT * problem.longest(&place, &step)).min(1.0);
-        let mut found = None;
-        for _ in 0..MOST_HALVINGS {
-            let moved: Vec<[f64; 2]> = place
-                .iter()
-                .zip(&step)
-                .map(|(p, s)| [p[0] + length * s[0], p[1] + length * s[1]])
-                .collect();
-            let there = problem.energy(&moved);
-            if there <= energy + SUFFICIENT * length * slope {
-                found = Some((moved, there));
-                break;
-            }
-            length *= 0.5;
-        }
-        let Some((moved, there)) = found else { break };
-        steps += 1;
-        let gain = (energy - there) / energy;
-        tracing::trace!(steps, energy = there / total, length, "symmetric Dirichlet");
-        (place, energy) = (moved, there);
-        if gain < LEAST_GAIN && length > 0.5 {
-            break;
-        }
-    }
-    problem.corners.put(map, &place);
-    Ok(Relaxed {
-        steps,
-        energy: [first / total, energy / total],
-    })
-}
-
 /// Gradient and Hessian by coordinates in frames that so many quarter turns take to the face's.
-fn turned_back(g: &[f64; 6], h: &[[f64; 6]; 6], turns: [u8; 3]) -> Derivatives {
+pub(super) fn turned_back(g: &[f64; 6], h: &[[f64; 6]; 6], turns: [u8; 3]) -> Derivatives {
     // Coordinate a of corner k is sign times coordinate from[a] of the face's frame.
     let source = |i: usize| -> (usize, f64) {
         let (k, a) = (i / 2, i % 2);
@@ -348,6 +185,7 @@ fn turned_back(g: &[f64; 6], h: &[[f64; 6]; 6], turns: [u8; 3]) -> Derivatives {
 
 #[cfg(test)]
 mod tests {
+    use super::super::complex::turned;
     use super::*;
 
     const FACE: [[f64; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.2, 0.1], [0.3, 1.1, -0.4]];

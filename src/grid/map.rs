@@ -2,7 +2,7 @@
 //!
 //! *Enters:* a surface on the plane, and its cone triangulation with steps. *Leaves:* the surface refined along the sides of those triangles, its corners in grid coordinates: integer points, lines and
 //! cells are the same whatever frame they are seen from. *Guaranteed:* both ends of every edge obey its transition, a quarter turn and an integer translation, exactly; cones and corners are at integer points, lines on
-//! lattice lines. *Not guaranteed:* little distortion: [`dirichlet`](super::dirichlet) sees to that.
+//! lattice lines. *Not guaranteed:* little distortion: [`relax`](super::relax) sees to that.
 
 use super::complex::turned;
 use super::error::GridError;
@@ -128,15 +128,50 @@ impl GridMap {
         c.face_halfedges(f).map(|h| self.sheet.at(h))
     }
 
-    /// The bearing of an anchor as it is now.
+    /// The bearing of an anchor as it is now, where its first halfedge has not turned by half a turn since.
     pub fn bearing(&self, anchor: &Anchor) -> f64 {
-        let c = &self.sheet.fine.connectivity;
-        let (old, now) = (
-            anchor.first,
-            self.sheet.vector(c.vertex_halfedge(anchor.vertex)),
-        );
-        let turn = super::complex::cross(old, now).atan2(old[0] * now[0] + old[1] * now[1]);
-        anchor.bearing - turn
+        let first = self.sheet.fine.connectivity.vertex_halfedge(anchor.vertex);
+        anchor.bearing - turn_between(anchor.first, self.sheet.vector(first))
+    }
+}
+
+/// The angle from one direction to another, in (−π, π].
+fn turn_between(from: [f64; 2], to: [f64; 2]) -> f64 {
+    super::complex::cross(from, to).atan2(from[0] * to[0] + from[1] * to[1])
+}
+
+/// The first halfedges of anchors while vertices move: about a cone of more than a full turn they may turn by more than half a turn in all.
+pub(super) struct Turning {
+    first: Vec<HalfedgeId>,
+    anchors: Vec<Anchor>,
+}
+
+impl Turning {
+    pub fn new(map: &GridMap) -> Self {
+        let c = &map.sheet.fine.connectivity;
+        let first = map.anchors.iter().map(|a| c.vertex_halfedge(a.vertex));
+        Self {
+            first: first.collect(),
+            anchors: map.anchors.clone(),
+        }
+    }
+
+    /// Takes bearings anew. To be asked whenever every vertex has moved along one segment without a face turned over: an edge turns by less than half a turn in this.
+    pub fn see(&mut self, corners: &Corners, place: &[[f64; 2]]) {
+        for (h, anchor) in self.first.iter().zip(&mut self.anchors) {
+            let (f, k) = (FaceId::new(h.index() / 3), h.index() % 3);
+            let at = corners.corners(f, place);
+            let (p, q) = (at[k], at[(k + 1) % 3]);
+            let now = [q[0] - p[0], q[1] - p[1]];
+            anchor.bearing -= turn_between(anchor.first, now);
+            anchor.first = now;
+        }
+    }
+
+    /// Gives the anchors their bearings, and the vertices their places.
+    pub fn put(self, map: &mut GridMap, corners: &Corners, place: &[[f64; 2]]) {
+        map.anchors = self.anchors;
+        corners.put(map, place);
     }
 }
 
@@ -490,4 +525,22 @@ fn nearest(lattice: &Lattice, side: HalfedgeId, p: [f64; 2]) -> [f64; 2] {
 fn distance(lattice: &Lattice, side: HalfedgeId, p: [f64; 2]) -> f64 {
     let [x, y] = nearest(lattice, side, p);
     (x - p[0]).hypot(y - p[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_than_half_a_turn_is_seen_in_parts() {
+        let start = [1.0, 0.0];
+        let (mut last, mut turned) = (start, 0.0);
+        for step in 1..=9 {
+            let (y, x) = (f64::from(step) * 0.4).sin_cos();
+            turned += turn_between(last, [x, y]);
+            last = [x, y];
+        }
+        assert!((turned - 3.6).abs() < 1e-12);
+        assert!((turn_between(start, last) - 3.6).abs() > 6.0);
+    }
 }

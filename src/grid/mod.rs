@@ -1,7 +1,7 @@
 //! The integer grid on an atlas whose transitions are quarter turns: a unit square lattice whose points, lines and cells are the same whatever chart they are seen from.
 //!
 //! *Enters:* a charted surface. *Leaves:* the same surface with finer faces, each in one cell block, and a [`Grid`]: grid coordinates, quads, blocks. [`cone_triangulation`] leaves of the surface triangles between cones; [`mod@quantise`] gives their sides
-//! whole numbers of cells; [`quads`] are the unit squares of that lattice, and [`blocks`] rectangles of them. `map` takes the surface there, `dirichlet` makes the map one of little distortion, `cut` draws the borders of blocks on the surface.
+//! whole numbers of cells; [`quads`] are the unit squares of that lattice, and [`blocks`] rectangles of them. `map` takes the surface there, `relax` makes the map one of little distortion, `cut` draws the borders of blocks on the surface.
 
 pub mod blocks;
 mod cells;
@@ -9,8 +9,9 @@ pub mod complex;
 pub mod cone_triangulation;
 pub(crate) mod cut;
 mod density;
-pub(crate) mod dirichlet;
+mod dirichlet;
 mod distortion;
+mod energy;
 mod error;
 pub mod islands;
 pub mod lattice;
@@ -22,9 +23,11 @@ mod patches;
 pub mod quads;
 pub mod quantise;
 mod refine;
+mod relax;
 pub(crate) mod sheet;
 pub(crate) mod slivers;
 mod squares;
+mod squeezed;
 mod system;
 #[cfg(test)]
 mod tests;
@@ -213,7 +216,7 @@ fn made(
     let cell_size = (areas.sum::<f64>() / quads.quads.len() as f64).sqrt();
     let unit = Units::new(mesh, cell_size, params.density)?;
     drop(part);
-    let relaxed = dirichlet::relax(&mut map, &unit)?;
+    let relaxed = relax::relax(&mut map, &unit)?;
     let unfolded = cells::unfold(&mut map, &quads, &unit)?;
     tracing::debug!(
         cones = cones.vertex.len(),

@@ -13,9 +13,9 @@ use crate::geometry::mesh::Mesh;
 use std::collections::HashMap;
 
 /// A surface made of squares of side 1, each cut into n × n and these into triangles, with inner vertices moved about; every face in a frame of its own.
-struct Squares {
+pub(super) struct Squares {
     connectivity: Connectivity,
-    uv: FaceVec<[[f64; 2]; 3]>,
+    pub(super) uv: FaceVec<[[f64; 2]; 3]>,
     is_line: EdgeVec<bool>,
     /// Of vertices, in space.
     place: Vec<[f64; 3]>,
@@ -104,7 +104,7 @@ impl Squares {
     }
 }
 
-fn no_lines(_: [f64; 3], _: [f64; 3]) -> bool {
+pub(super) fn no_lines(_: [f64; 3], _: [f64; 3]) -> bool {
     false
 }
 
@@ -131,7 +131,11 @@ fn cuboid(size: [usize; 3], n: usize, line: impl Fn([f64; 3], [f64; 3]) -> bool)
 }
 
 /// Unit squares of the plane at some places.
-fn plate(cells: &[[usize; 2]], n: usize, line: impl Fn([f64; 3], [f64; 3]) -> bool) -> Squares {
+pub(super) fn plate(
+    cells: &[[usize; 2]],
+    n: usize,
+    line: impl Fn([f64; 3], [f64; 3]) -> bool,
+) -> Squares {
     let square = |&[i, j]: &[usize; 2]| {
         let at = |a: usize, b: usize| [(i + a) as f64, (j + b) as f64, 0.0];
         [at(0, 0), at(1, 0), at(1, 1), at(0, 1)]
@@ -468,7 +472,7 @@ fn numbers_that_are_none_are_refused() {
 }
 
 /// A surface of squares in space.
-fn mesh(squares: &Squares) -> Mesh {
+pub(super) fn mesh(squares: &Squares) -> Mesh {
     let (vertices, faces) = (
         squares.connectivity.vertex_count(),
         squares.connectivity.face_count(),

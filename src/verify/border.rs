@@ -1,9 +1,9 @@
 //! Whether the border of a patch keeps away from itself: another way to see that no two of its faces overlap.
 //!
-//! A disk whose faces are all counterclockwise covers a point of the plane as often as its border winds around that point. So where the
-//! border is one simple closed curve, every point is covered once at most. This takes the border's edges alone, which are few; and patches of
-//! long faces that all meet in one point, where every pair of faces would have to be looked at, have a short one. A part of a slit disk that
-//! has one border is a disk.
+//! Faces that are all counterclockwise cover a point of the plane as often as their border winds around that point, whatever surface they make: both sides
+//! of every other edge lie at the same place and cancel. So where the border is one simple closed curve, every point is covered once at most. This takes
+//! the border's edges alone, which are few; and patches of long faces that all meet in one point, where every pair of faces would have to be looked at,
+//! have a short one.
 //!
 //! *Guaranteed:* a border is called simple only where edges that are no neighbours are further apart than the tolerance: sheets that overlap exactly along the
 //! lines of a grid cross in corners alone, which looks like touching. *Not guaranteed:* that every simple border is recognised.
@@ -18,7 +18,7 @@ use super::surface::Surface;
 /// Most pairs of edges that are compared, for each edge, and besides.
 const PAIRS: (u64, u64) = (2000, 10_000_000);
 
-/// True where the border of a part of a slit disk is one closed curve that stays away from itself by more than `tolerance` (a length). False where there are
+/// True where the border of a patch is one closed curve that stays away from itself by more than `tolerance` (a length). False where there are
 /// several borders, where neighbours inside do not meet, or where that cannot be told in bounded work. `inside` tells halfedges across which the part goes on.
 pub(super) fn is_simple(
     surface: &Surface<'_>,

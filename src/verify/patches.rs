@@ -149,7 +149,6 @@ fn check_inside(
     options: &VerifyOptions,
     verdicts: &mut Verdicts,
 ) {
-    let cut = arrays.cut.as_flattened();
     let patches = groups.start.len() - 1;
     let diameter: Vec<f64> = (0..patches)
         .map(|p| extent(arrays, groups.of(p)).diagonal())
@@ -158,21 +157,12 @@ fn check_inside(
     let mut gap = Worst::default();
     for (h, t) in surface.inner_edges() {
         let (f, g) = (h / 3, t / 3);
-        if arrays.patch[f] != arrays.patch[g] {
-            continue;
-        }
-        let ends = [
-            (surface.tail_corner(h), surface.head_corner(t)),
-            (surface.head_corner(h), surface.tail_corner(t)),
-        ]
-        .map(|(a, b)| [a, b].map(|corner| at_corner(&arrays.patch_uv, corner)));
         let patch = document.patches.get(arrays.patch[f] as usize);
-        let may_lie_across = patch.is_some_and(|patch| patch.domain != "flat");
-        if cut[h] != 0 && !(may_lie_across && ends.iter().all(|[a, b]| a == b)) {
+        if !goes_on(surface, arrays, patch, [h, t]) {
             continue;
         }
         sheets.join(f, g);
-        for [a, b] in ends {
+        for [a, b] in ends(surface, arrays, [h, t]) {
             gap.see(distance2(a, b) / diameter[arrays.patch[f] as usize]);
         }
     }
@@ -195,6 +185,29 @@ fn check_inside(
         gap.0 < options.tolerance,
         format!("{:.3e} of the patch's diameter", gap.0),
     );
+}
+
+/// Ends of an edge in its patch, each as either side has it.
+fn ends(surface: &Surface<'_>, arrays: &Arrays, [h, t]: [usize; 2]) -> [[Point2; 2]; 2] {
+    [
+        (surface.tail_corner(h), surface.head_corner(t)),
+        (surface.head_corner(h), surface.tail_corner(t)),
+    ]
+    .map(|(a, b)| [a, b].map(|corner| at_corner(&arrays.patch_uv, corner)))
+}
+
+/// Whether a patch goes on across an edge between two faces: off the cut, and over the cut where both sides agree in a block of a grid, which has
+/// coordinates of its own.
+fn goes_on(
+    surface: &Surface<'_>,
+    arrays: &Arrays,
+    patch: Option<&Patch>,
+    [h, t]: [usize; 2],
+) -> bool {
+    let is_block = || patch.is_some_and(|patch| patch.domain != "flat");
+    let agree = || (ends(surface, arrays, [h, t]).iter()).all(|[a, b]| a == b);
+    arrays.patch[h / 3] == arrays.patch[t / 3]
+        && (arrays.cut.as_flattened()[h] == 0 || is_block() && agree())
 }
 
 pub(super) fn extent(arrays: &Arrays, faces: &[u32]) -> Extent2 {
@@ -242,10 +255,9 @@ fn measure(
     let lacks_map = patch.patch_to_chart.is_none() && patch.domain == "flat";
     let flipped = faces.iter().any(|f| !is_positive(uv(*f), reach));
     let tolerance = OVERLAP_TOLERANCE * diameter;
-    let cut = arrays.cut.as_flattened();
     let inside = |h: usize| {
-        let beyond = surface.twin(h).map(|t| arrays.patch[t / 3]);
-        cut[h] == 0 && beyond == Some(arrays.patch[h / 3])
+        let beyond = surface.twin(h);
+        beyond.is_some_and(|t| goes_on(surface, arrays, Some(patch), [h, t]))
     };
     let simple = !flipped && border::is_simple(surface, arrays, faces, inside, tolerance);
     let overlap = match simple {

@@ -1,0 +1,110 @@
+//! The map of least distortion that is one to one: Newton's method on the symmetric Dirichlet energy.
+//!
+//! *Enters:* a [`GridMap`] without a face turned over. *Leaves:* the same with moved vertices: Σ area (‖J‖² + ‖J⁻¹‖²) over the faces is (nearly) least, where J takes the surface, lengths in cells, to the grid.
+//! *Guaranteed:* every face keeps a positive area at every step, since the energy is infinite where one loses it; cones stay, lines stay on their lattice lines; the same for any number of threads. *Not guaranteed:* the
+//! least of all maps: it is a local minimum.
+//!
+//! Steps end before the first face loses its area (Smith, Schaefer 2015); where that is early, the faces that are in the way are made wider first.
+
+use super::density::Units;
+use super::energy::{Energy, Places};
+use super::error::GridError;
+use super::map::{GridMap, Turning, is_turned_over};
+use super::squeezed::{BEFORE_FLAT, MOST_HALVINGS, SUFFICIENT, widen};
+use super::system::Equations;
+use crate::geometry::ids::FaceId;
+use crate::observe::part;
+
+/// Most steps.
+const MOST_STEPS: usize = 40;
+/// It ends where a step lowers the energy by less than this part.
+const LEAST_GAIN: f64 = 1e-4;
+/// A step of less than this part of its length was stopped by squeezed faces.
+const SHORT: f64 = 0.5;
+
+/// What came of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Relaxed {
+    /// Steps.
+    pub steps: usize,
+    /// Mean of ‖J‖² + ‖J⁻¹‖² before and after, 4 for an isometry.
+    pub energy: [f64; 2],
+}
+
+/// Moves vertices until the energy is least; see the module docs.
+pub(crate) fn relax(map: &mut GridMap, unit: &Units) -> Result<Relaxed, GridError> {
+    let _part = part!("relax");
+    let c = &map.sheet.fine.connectivity;
+    let mut place: Vec<[f64; 2]> = c.vertices().map(|v| map.place(v)).collect();
+    let energy = Energy::new(map, unit);
+    let first = energy.total(&place);
+    if !first.is_finite() {
+        let flat = |f: &FaceId| energy.corners.corners(*f, &place);
+        let over: Vec<FaceId> = c.faces().filter(|f| is_turned_over(flat(f))).collect();
+        let face = over.first().copied().unwrap_or(FaceId::new(0));
+        let count = over.len();
+        return Err(GridError::TurnedOver { count, face });
+    }
+    let is_free: Vec<[bool; 2]> = map.freedom.iter().map(|f| f.axes()).collect();
+    let may_move: Vec<bool> = is_free.iter().map(|axes| *axes != [false; 2]).collect();
+    let triples = energy.faces.iter().map(|&f| energy.corners.vertices(f));
+    let mut equations = Equations::new(triples, &may_move)?;
+    let mut turning = Turning::new(map);
+    let widened = |place: &mut Places, turning: &mut Turning| {
+        let _part = part!("squeezed faces");
+        let mut see = |place: &Places| turning.see(&energy.corners, place);
+        widen(&energy, c, place, &is_free, &mut see);
+        energy.total(place)
+    };
+    let mut now = widened(&mut place, &mut turning);
+    let mut steps = 0;
+    while steps < MOST_STEPS {
+        let of_face = |i: usize| energy.derivatives(energy.faces[i], &place);
+        equations.sum(of_face, |v| is_free[v]);
+        let (step, slope) = equations.newton_step()?;
+        let Some((length, moved, there)) = search(&energy, &place, &step, now, slope) else {
+            break;
+        };
+        steps += 1;
+        let gain = (now - there) / now;
+        let mean = there / energy.area;
+        tracing::trace!(steps, energy = mean, length, "symmetric Dirichlet");
+        (place, now) = (moved, there);
+        turning.see(&energy.corners, &place);
+        if gain < LEAST_GAIN && length > SHORT {
+            break;
+        }
+        if length < SHORT {
+            now = widened(&mut place, &mut turning);
+        }
+    }
+    turning.put(map, &energy.corners, &place);
+    Ok(Relaxed {
+        steps,
+        energy: [first, now].map(|x| x / energy.area),
+    })
+}
+
+/// The length of the step that lowers the energy enough, where it leads, and the energy there.
+fn search(
+    energy: &Energy,
+    place: &Places,
+    step: &Places,
+    now: f64,
+    slope: f64,
+) -> Option<(f64, Vec<[f64; 2]>, f64)> {
+    let _part = part!("line search");
+    let mut length = (BEFORE_FLAT * energy.longest_of_all(place, step)).min(1.0);
+    for _ in 0..MOST_HALVINGS {
+        let ends = place.iter().zip(step);
+        let moved: Vec<[f64; 2]> = ends
+            .map(|(p, s)| [p[0] + length * s[0], p[1] + length * s[1]])
+            .collect();
+        let there = energy.total(&moved);
+        if there <= now + SUFFICIENT * length * slope {
+            return Some((length, moved, there));
+        }
+        length *= 0.5;
+    }
+    None
+}
