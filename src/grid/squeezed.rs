@@ -17,7 +17,7 @@ pub(super) const SUFFICIENT: f64 = 1e-4;
 pub(super) const MOST_HALVINGS: usize = 30;
 
 /// ‖J‖² + ‖J⁻¹‖² of squeezed faces; 4 is an isometry.
-const SQUEEZED: f64 = 100.0;
+const SQUEEZED: f64 = 50.0;
 /// Rounds over vertices of squeezed faces.
 const MOST_ROUNDS: usize = 30;
 /// Part of the energy around a vertex that it gains at least, to be looked at again.
