@@ -7,12 +7,15 @@ pub mod file;
 
 use crate::geometry::disjoint_sets::UnionFind;
 use crate::geometry::ids::{EdgeId, EdgeVec, VertexId, VertexVec};
-use crate::geometry::mesh::{Mesh, cross, dot, sub};
+use crate::geometry::mesh::{Mesh, cross, dot, sub, triangle_area};
 use std::cmp::Ordering;
 use std::path::PathBuf;
 
 /// Fewest edges of a chain that counts where nobody named them: shorter ones are mostly noise.
 pub const LEAST_EDGES: usize = 5;
+/// And its least length, in square roots of the surface's area: about a side of the cells when there are 2,000. What is shorter has no place in a grid, however
+/// many edges it has.
+pub const LEAST_LENGTH: f64 = 0.02;
 
 /// Sine of the angle at a corner below which a face has no direction.
 const FLAT: f64 = 1e-6;
@@ -83,10 +86,18 @@ pub fn features(mesh: &Mesh, params: &FeatureParams, named: &[EdgeId]) -> Vec<Fe
         is_one && !c.is_boundary_edge(e)
     };
     let sharp: EdgeVec<bool> = c.edges().map(is_sharp).collect();
+    let area: f64 = c
+        .faces()
+        .map(|f| triangle_area(mesh.face_positions(f)))
+        .sum();
+    let counts = |f: &Feature| {
+        f.edges.len() >= LEAST_EDGES && f.length >= LEAST_LENGTH * area.sqrt()
+            || f.edges.iter().any(|&e| is_named[e])
+    };
     let mut found: Vec<Feature> = chains(mesh, &sharp)
         .into_iter()
         .map(|chain| feature(mesh, &bend, chain))
-        .filter(|f| f.edges.len() >= LEAST_EDGES || f.edges.iter().any(|&e| is_named[e]))
+        .filter(counts)
         .collect();
     found.sort_by(|a, b| {
         let order = b.importance().partial_cmp(&a.importance());
@@ -194,5 +205,58 @@ fn feature(mesh: &Mesh, bend: &EdgeVec<f64>, vertices: Vec<VertexId>) -> Feature
         edges,
         length,
         angle: if length > 0.0 { turned / length } else { 0.0 },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::mesh::Soup;
+    use crate::repair::{RepairParams, repair};
+
+    /// A unit square with two squares of other materials, of sides 0.5 and 0.004, each between grid lines with `n` edges on every side.
+    fn marked(n: u32) -> Mesh {
+        let breaks = [0.0, 0.1, 0.6, 0.75, 0.754, 1.0];
+        let mut line: Vec<f64> = breaks
+            .windows(2)
+            .flat_map(|part| {
+                (0..n).map(|k| part[0] + (part[1] - part[0]) * f64::from(k) / f64::from(n))
+            })
+            .collect();
+        line.push(1.0);
+        let count = line.len() as u32;
+        let positions = line.iter().flat_map(|y| line.iter().map(|x| [*x, *y, 0.0]));
+        let mut faces = Vec::new();
+        let mut materials = Vec::new();
+        for (i, j) in (0..5 * n).flat_map(|j| (0..5 * n).map(move |i| (i, j))) {
+            let a = count * j + i;
+            faces.extend([[a, a + 1, a + count + 1], [a, a + count + 1, a + count]]);
+            let material = match [i / n, j / n] {
+                [1, 1] => 1,
+                [3, 3] => 2,
+                _ => 0,
+            };
+            materials.extend([material; 2]);
+        }
+        let mut soup = Soup::from_triangles(positions.collect(), faces);
+        soup.face_material = materials;
+        let repaired = repair(&soup, &RepairParams::default()).expect("a plain square");
+        let first = repaired.components.into_iter().next().expect("one");
+        first.mesh.expect("connected")
+    }
+
+    #[test]
+    fn which_chains_count_does_not_depend_on_the_density_of_the_mesh() {
+        let params = FeatureParams {
+            angle: 180.0,
+            materials: true,
+            ..FeatureParams::default()
+        };
+        for n in [2, 4, 8] {
+            let found = features(&marked(n), &params, &[]);
+            assert_eq!(found.len(), 1, "{n}");
+            assert_eq!(found[0].edges.len(), 4 * n as usize);
+            assert!((found[0].length - 2.0).abs() < 1e-12);
+        }
     }
 }

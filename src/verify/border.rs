@@ -5,8 +5,8 @@
 //! the border's edges alone, which are few; and patches of long faces that all meet in one point, where every pair of faces would have to be looked at,
 //! have a short one.
 //!
-//! *Guaranteed:* a border is called simple only where edges that are no neighbours are further apart than the tolerance: sheets that overlap exactly along the
-//! lines of a grid cross in corners alone, which looks like touching. *Not guaranteed:* that every simple border is recognised.
+//! *Guaranteed:* a border is called simple only where edges without a common end are further apart than the tolerance, and those with one do not cross in it:
+//! sheets that overlap exactly along the lines of a grid cross in corners alone. *Not guaranteed:* that every simple border is recognised.
 //! The stage that makes patches asks the same question of exact predicates in code of its own.
 
 use super::arrays::Arrays;
@@ -14,11 +14,12 @@ use super::central::at_corner;
 use super::formulas::{Point2, distance2, sub2};
 use super::grid::Grid;
 use super::surface::Surface;
+use std::cmp::Ordering;
 
 /// Most pairs of edges that are compared, for each edge, and besides.
 const PAIRS: (u64, u64) = (2000, 10_000_000);
 
-/// True where the border of a patch is one closed curve that stays away from itself by more than `tolerance` (a length). False where there are
+/// True where the border of a patch is one closed curve that stays away from itself by more than `tolerance` (a length), or touches itself in corners. False where there are
 /// several borders, where neighbours inside do not meet, or where that cannot be told in bounded work. `inside` tells halfedges across which the part goes on.
 pub(super) fn is_simple(
     surface: &Surface<'_>,
@@ -82,8 +83,8 @@ fn around(
     }
 }
 
-/// Whether the edges of closed polygons are further than `tolerance` from each other, but for neighbours near their common corner; false where too many lie
-/// near each other.
+/// Whether the edges of closed polygons are further than `tolerance` from each other, but near a common end, where they do not cross: a polygon may touch
+/// another one and itself in corners that are equal bit by bit. False where too many edges lie near each other.
 pub(super) fn keep_away(polygons: &[Vec<Point2>], tolerance: f64) -> bool {
     let mut points = polygons.iter().flatten().flatten();
     if !points.all(|x| x.is_finite()) || polygons.iter().any(|p| p.len() < 3) {
@@ -96,6 +97,9 @@ pub(super) fn keep_away(polygons: &[Vec<Point2>], tolerance: f64) -> bool {
         edges.extend((0..n).map(|i| [polygon[i], polygon[(i + 1) % n]]));
         next.extend((0..n).map(|i| first + (i + 1) % n));
     }
+    if corners_cross(&edges, &next) {
+        return false;
+    }
     let n = edges.len();
     let Ok(grid) = Grid::new(&edges, tolerance, 256 * n + 100_000) else {
         return false;
@@ -107,15 +111,7 @@ pub(super) fn keep_away(polygons: &[Vec<Point2>], tolerance: f64) -> bool {
     if pairs > limit(n) {
         return false;
     }
-    let meet = |a: usize, b: usize| {
-        if next[a] == b {
-            neighbours_meet(edges[a], edges[b], tolerance)
-        } else if next[b] == a {
-            neighbours_meet(edges[b], edges[a], tolerance)
-        } else {
-            edges_meet(edges[a], edges[b], tolerance)
-        }
-    };
+    let meet = |a: usize, b: usize| edges_meet(edges[a], edges[b], tolerance);
     (0..grid.cells()).all(|cell| {
         let items = in_cell(cell);
         items.iter().enumerate().all(|(i, a)| {
@@ -125,8 +121,44 @@ pub(super) fn keep_away(polygons: &[Vec<Point2>], tolerance: f64) -> bool {
     })
 }
 
-/// Whether two edges cross or come this near.
+/// Whether polygons cross in a common corner: of the edges that meet there, taken by angle, the two of every corner enclose both or none of any other.
+fn corners_cross(edges: &[[Point2; 2]], next: &[usize]) -> bool {
+    // The corner between an edge and the next one; all points are finite.
+    let mut corners: Vec<usize> = (0..edges.len()).collect();
+    let order = |a: &usize, b: &usize| edges[*a][1].partial_cmp(&edges[*b][1]);
+    corners.sort_unstable_by(|a, b| order(a, b).unwrap_or(Ordering::Equal));
+    corners
+        .chunk_by(|a, b| edges[*a][1] == edges[*b][1])
+        .filter(|common| common.len() > 1)
+        .any(|common| {
+            let directions = common.iter().flat_map(|corner| {
+                let ([before, p], [_, after]) = (edges[*corner], edges[next[*corner]]);
+                [before, after].map(|end| {
+                    let d = sub2(end, p);
+                    (d[1].atan2(d[0]), *corner)
+                })
+            });
+            let mut directions: Vec<(f64, usize)> = directions.collect();
+            directions.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+            let mut open: Vec<usize> = Vec::new();
+            for (_, corner) in directions {
+                if open.last() == Some(&corner) {
+                    open.pop();
+                } else {
+                    open.push(corner);
+                }
+            }
+            !open.is_empty()
+        })
+}
+
+/// Whether two edges cross or come this near; those with a common end, away from there.
 fn edges_meet(a: [Point2; 2], b: [Point2; 2], tolerance: f64) -> bool {
+    for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+        if a[i] == b[j] {
+            return is_near(a[1 - i], b, tolerance) || is_near(b[1 - j], a, tolerance);
+        }
+    }
     let side = |[p, q]: [Point2; 2], r: Point2| {
         let (d, e) = (sub2(q, p), sub2(r, p));
         d[0] * e[1] - d[1] * e[0]
@@ -134,11 +166,6 @@ fn edges_meet(a: [Point2; 2], b: [Point2; 2], tolerance: f64) -> bool {
     let divides = |a, b: [Point2; 2]| (side(a, b[0]) < 0.0) != (side(a, b[1]) < 0.0);
     let near = |a, b: [Point2; 2]| b.iter().any(|p| is_near(*p, a, tolerance));
     divides(a, b) && divides(b, a) || near(a, b) || near(b, a)
-}
-
-/// Whether two edges, of which one begins where the other ends, come this near away from there.
-fn neighbours_meet(a: [Point2; 2], b: [Point2; 2], tolerance: f64) -> bool {
-    is_near(a[0], b, tolerance) || is_near(b[1], a, tolerance)
 }
 
 fn is_near(r: Point2, [p, q]: [Point2; 2], tolerance: f64) -> bool {
@@ -207,6 +234,22 @@ mod tests {
         };
         assert!(((0..n).map(turn).sum::<f64>() - TAU).abs() < 1e-12);
         assert!(!keeps_away(&points, 1e-9));
+    }
+
+    #[test]
+    fn a_curve_may_touch_itself_in_a_corner_and_not_cross_there() {
+        let p = [0.0, 0.0];
+        let (a, b, c, d) = ([2.0, 1.0], [2.0, -1.0], [-2.0, 1.0], [-2.0, -1.0]);
+        assert!(keeps_away(&[p, b, a, p, c, d], 1e-9));
+        assert!(!keeps_away(&[p, b, a, p, d, c], 1e-9));
+        // One triangle beside another, and one with a corner on the edge of another.
+        let (apart, touching) = ([p, b, a], [p, c, d]);
+        assert!(keep_away(&[apart.to_vec(), touching.to_vec()], 1e-9));
+        let on_edge = [[2.0, 0.0], [3.0, -1.0], [3.0, 1.0]];
+        assert!(!keep_away(&[apart.to_vec(), on_edge.to_vec()], 1e-9));
+        // Crossing in their common corner alone.
+        let across = [p, [1.0, 2.0], [3.0, 0.0]];
+        assert!(!keep_away(&[apart.to_vec(), across.to_vec()], 1e-9));
     }
 
     #[test]
