@@ -352,6 +352,16 @@ mod tests {
         agree(&sliver);
     }
 
+    /// All of its triangles are doubtful, and nearer to each other than the tolerance.
+    #[test]
+    fn an_island_that_is_a_point_overlaps_nothing() {
+        let mut drawing = sheet(8, |x, y| [0.1 + 0.3 * x, 0.1 + 0.3 * y]);
+        add_sheet(&mut drawing, 30, |_, _| [0.5, 0.5]);
+        let doubtful = drawing.doubtful().expect("the border is simple");
+        assert_eq!(doubtful.len(), 1800);
+        assert_eq!(agree(&drawing), Overlap::None);
+    }
+
     #[test]
     fn triangles_of_own_corners_are_joined_where_these_are_equal() {
         let mut drawing = sheet(4, |x, y| [x, y]);

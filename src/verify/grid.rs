@@ -30,8 +30,13 @@ impl Grid {
         let size = [0, 1].map(|i| (extent.max[i] - extent.min[i] + 2.0 * margin).max(1e-300));
         // Cells as square as the extent allows.
         let aspect = (size[0] / size[1]).clamp(1e-3, 1e3).sqrt();
-        let columns = ((side as f64 * aspect).ceil() as usize).clamp(1, 1 << 16);
-        let rows = ((side as f64 / aspect).ceil() as usize).clamp(1, 1 << 16);
+        // None narrower than the margin, which would only multiply the entries.
+        let cells = |wanted: f64, size: f64| {
+            let cells = wanted.ceil().min((size / margin).floor());
+            (cells as usize).clamp(1, 1 << 16)
+        };
+        let columns = cells(side as f64 * aspect, size[0]);
+        let rows = cells(side as f64 / aspect, size[1]);
         let mut grid = Self {
             origin: [extent.min[0] - margin, extent.min[1] - margin],
             density: [columns as f64 / size[0], rows as f64 / size[1]],
