@@ -11,10 +11,11 @@
 
 use super::density::Units;
 use super::error::GridError;
-use super::map::{Corners, Freedom, GridMap, Turning, double_area};
+use super::map::{Corners, Freedom, GridMap, Turning};
 use super::quads::QuadMesh;
 use super::squares::Squares;
 use super::system::{Derivatives, Equations};
+use super::triangle::double_area;
 use crate::geometry::ids::{FaceId, VertexId, VertexVec};
 use crate::geometry::mesh::{cross, dot, norm, sub};
 use crate::observe::part;
@@ -348,7 +349,7 @@ fn locate<'a>(
     for f in c.faces() {
         let p = map.corners(f);
         let whole = double_area(p);
-        let thickness = super::slivers::thickness(p);
+        let thickness = super::triangle::thickness(p);
         let range = |i: usize| {
             let of = p.map(|p| p[i]);
             let low = of[0].min(of[1]).min(of[2]) - NO_WEIGHT;

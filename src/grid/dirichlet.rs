@@ -2,8 +2,8 @@
 //!
 //! Its Hessian is made positive semidefinite by its eigenvalues, known in closed form (Smith, de Goes, Kim 2019).
 
-use super::map::double_area;
 use super::system::Derivatives;
+use super::triangle::double_area;
 
 /// Faces whose height in space is less than this part of their longest side are slivers, where edges of two triangulations nearly meet. They say nothing about the shape of the surface:
 /// the energy is to keep them as they are at first.

@@ -7,8 +7,9 @@ use super::blocks::{Blocks, corner};
 use super::complex::turned;
 use super::cut::Placed;
 use super::error::GridError;
-use super::map::{GridMap, double_area};
+use super::map::GridMap;
 use super::quads::QuadMesh;
+use super::triangle::double_area;
 use crate::geometry::ids::{FaceId, FaceVec, NONE, VertexId};
 use rustc_hash::FxHashMap;
 

@@ -9,6 +9,7 @@ use super::error::GridError;
 use super::lattice::{Lattice, UNIT};
 use super::quads::QuadMesh;
 use super::sheet::{Aim, Sheet};
+use super::triangle::double_area;
 use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId, HalfedgeVec, NONE, VertexId, VertexVec};
 use crate::geometry::subdivision::Subdivision;
 use std::collections::VecDeque;
@@ -220,17 +221,6 @@ impl Corners {
         let [x, y] = turned(place[*v as usize], *turns);
         [x + shift[0] as f64, y + shift[1] as f64]
     }
-}
-
-/// Twice the area of a triangle.
-pub(crate) fn double_area([p, q, r]: [[f64; 2]; 3]) -> f64 {
-    (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
-}
-
-/// Whether a triangle has no area, or a negative one.
-pub(crate) fn is_turned_over(corners: [[f64; 2]; 3]) -> bool {
-    let area = double_area(corners);
-    area <= 0.0 || area.is_nan()
 }
 
 /// Where a face lies: in which triangle between cones, and how its frame turns and moves into that of the triangle.

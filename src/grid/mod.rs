@@ -31,6 +31,7 @@ mod squeezed;
 mod system;
 #[cfg(test)]
 mod tests;
+pub(crate) mod triangle;
 mod walk;
 
 pub use distortion::Distortion;

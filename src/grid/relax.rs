@@ -9,9 +9,10 @@
 use super::density::Units;
 use super::energy::{Energy, Places};
 use super::error::GridError;
-use super::map::{GridMap, Turning, is_turned_over};
+use super::map::{GridMap, Turning};
 use super::squeezed::{BEFORE_FLAT, MOST_HALVINGS, SUFFICIENT, widen};
 use super::system::Equations;
+use super::triangle::is_turned_over;
 use crate::geometry::ids::FaceId;
 use crate::observe::part;
 

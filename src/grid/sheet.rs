@@ -6,8 +6,7 @@
 
 use super::complex::{cross, turned};
 use super::error::GridError;
-use super::map::double_area;
-use super::slivers::{THICK, thickness};
+use super::triangle::{THICK, double_area, thickness};
 use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, HalfedgeId, HalfedgeVec, NONE, VertexId};
 use crate::geometry::subdivision::Subdivision;
 

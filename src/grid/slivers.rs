@@ -3,12 +3,11 @@
 //! *Enters:* a [`GridMap`] that is one to one but for a few thin faces, whose vertices rounding has put on the wrong side. *Leaves:* the same with these vertices moved, so that every face is as thick as
 //! [`THICK`] if it can be. The surface stays: only the map to the grid changes, by less than thin faces are long. *Not guaranteed:* that it succeeds.
 
-use super::map::{Freedom, GridMap, double_area, is_turned_over};
+use super::map::{Freedom, GridMap};
+use super::triangle::{THICK, is_turned_over, thickness};
 use crate::geometry::ids::{FaceId, VertexId};
 use std::collections::BTreeSet;
 
-/// Twice the area over the square of the longest side that faces are to have.
-pub(super) const THICK: f64 = 1e-5;
 /// Rounds over the vertices of thin faces.
 const MOST_ROUNDS: usize = 50;
 /// Distances that a vertex is tried to be moved by: halves of the size of its star.
@@ -23,19 +22,6 @@ const DIRECTIONS: [[f64; 2]; 8] = [
     [0.0, -1.0],
     [0.7, -0.7],
 ];
-
-/// Twice the area over the square of the longest side.
-pub(super) fn thickness(p: [[f64; 2]; 3]) -> f64 {
-    let squared = |k: usize| {
-        let (a, b) = (p[k], p[(k + 1) % 3]);
-        (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2)
-    };
-    let longest = squared(0).max(squared(1)).max(squared(2));
-    match longest > 0.0 {
-        true => double_area(p) / longest,
-        false => 0.0,
-    }
-}
 
 /// Moves vertices of thin faces; see the module docs. The number of faces without area that are left.
 pub(crate) fn thicken(map: &mut GridMap) -> usize {

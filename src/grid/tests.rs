@@ -528,7 +528,9 @@ fn assert_gridded(squares: &Squares, cells: usize) -> super::Grid {
         }
     }
     let double = |uv: &FaceVec<[[f64; 2]; 3]>| -> Vec<f64> {
-        uv.iter().map(|p| super::map::double_area(*p)).collect()
+        uv.iter()
+            .map(|p| super::triangle::double_area(*p))
+            .collect()
     };
     let (on_grid, in_blocks) = (double(&grid.uv), double(&located.uv));
     assert!(on_grid.iter().all(|area| *area > 0.0));
@@ -543,7 +545,7 @@ fn assert_gridded(squares: &Squares, cells: usize) -> super::Grid {
         let corners = own.map(|(f, _)| located.uv[f]);
         let mut area = 0.0;
         for p in corners {
-            area += 0.5 * super::map::double_area(p);
+            area += 0.5 * super::triangle::double_area(p);
             for [x, y] in p {
                 assert!((0.0..=block.cells[0] as f64).contains(&x));
                 assert!((0.0..=block.cells[1] as f64).contains(&y));

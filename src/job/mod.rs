@@ -6,6 +6,7 @@
 //! spline surface, [`texture`] lays a pattern over the surface, [`explain`] says what is wrong.
 
 mod charting;
+mod checks;
 mod error;
 pub mod explain;
 pub mod fit;

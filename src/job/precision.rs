@@ -6,7 +6,7 @@
 //!
 //! It only words a refusal. Whether there is one, the checks decide: many meshes with such faces are built.
 
-use super::error::{failed_of, listed};
+use super::checks::{failed_of, listed};
 use crate::atlas::develop::diameter;
 use crate::geometry::ids::FaceId;
 use crate::geometry::mesh::{Soup, bounding_box, distance, triangle_area};

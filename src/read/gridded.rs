@@ -9,7 +9,7 @@
 use super::atlas::{FolderError, checked_json};
 use super::npz::Npz;
 use crate::grid::complex::turned;
-use crate::grid::map::is_turned_over;
+use crate::grid::triangle::is_turned_over;
 use serde::Deserialize;
 use std::path::Path;
 

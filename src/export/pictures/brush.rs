@@ -3,29 +3,18 @@
 //! Pixels of one face share what depends on the face only ([`Aspect`]). Where such pixels follow each other in a row, light and weights are
 //! worked out for the first and the last of a few and go evenly from the one to the other.
 
+use super::aspect::{Aspect, Spot};
 use super::colour::{Linear, mix, to_bytes};
-use super::raster::{NOTHING, SAMPLES, place};
-use super::studio::{Mark, Studio};
-use super::view::{Vec3, along, is_behind, unit};
+use super::raster::{Band, NOTHING, SAMPLES, place};
+use super::studio::{BAND, Mark, Studio};
+use image::RgbImage;
+use rayon::prelude::*;
 
 /// Columns of which light and weights are worked out for the ends only.
 const STRETCH: usize = 8;
 
 /// Tint of the back of the surface.
 const INSIDE: Linear = [0.55, 0.40, 0.30];
-
-/// A point of the surface that a pixel shows.
-#[derive(Clone, Copy)]
-pub struct Spot {
-    /// Its face.
-    pub face: usize,
-    /// Its barycentric weights.
-    pub weights: [f64; 3],
-    /// By how much these change to the next pixel to the right, …
-    pub right: [f64; 3],
-    /// … and to the one below.
-    pub down: [f64; 3],
-}
 
 /// What the surface looks like without light, in each of `N` pictures.
 pub trait Paint<const N: usize>: Sync {
@@ -36,90 +25,6 @@ pub trait Paint<const N: usize>: Sync {
 
     /// Of a spot of that face.
     fn colours(&self, of_face: &mut Self::OfFace, spot: &Spot) -> [Linear; N];
-}
-
-/// What pixels of one face share: weights and normal are linear on the screen, up to a common factor.
-pub struct Aspect {
-    pub face: u32,
-    /// Whether its back is seen.
-    pub is_behind: bool,
-    /// Where `parts` and `normal` begin.
-    origin: [f64; 2],
-    /// Weight of each corner there, and by how much it grows to the right and downwards.
-    parts: [[f64; 3]; 3],
-    /// The same of the normal towards the eye.
-    normal: [Vec3; 3],
-}
-
-impl Aspect {
-    /// Of a face with these corners on the screen and unit normals there.
-    pub fn new(face: u32, screen: [Vec3; 3], normals: &[Vec3; 3]) -> Aspect {
-        let [a, b, c] = screen;
-        let origin = [a[0], a[1]];
-        // The weight of a corner is 0 along the opposite side; closeness undoes the perspective.
-        let slope = |p: Vec3, q: Vec3, near: f64| [near * (p[1] - q[1]), near * (q[0] - p[0])];
-        let ([of_a, of_b, of_c], d) = (
-            [slope(b, c, a[2]), slope(c, a, b[2]), slope(a, b, c[2])],
-            [a[0] - b[0], a[1] - b[1]],
-        );
-        let parts = [
-            [of_a[0] * d[0] + of_a[1] * d[1], of_a[0], of_a[1]],
-            [0.0, of_b[0], of_b[1]],
-            [0.0, of_c[0], of_c[1]],
-        ];
-        let is_behind = is_behind(&screen);
-        // Weights of clockwise triangles are negative.
-        let sign = match is_behind == (parts[0][0] > 0.0) {
-            true => -1.0,
-            false => 1.0,
-        };
-        let normal = |i: usize| {
-            let of_a = along([0.0; 3], sign * parts[0][i], normals[0]);
-            let of_b = along(of_a, sign * parts[1][i], normals[1]);
-            along(of_b, sign * parts[2][i], normals[2])
-        };
-        Aspect {
-            face,
-            is_behind,
-            origin,
-            normal: [normal(0), normal(1), normal(2)],
-            parts,
-        }
-    }
-
-    /// The spot at a place of the picture.
-    pub fn spot(&self, at: [f64; 2]) -> Spot {
-        let (x, y) = (at[0] - self.origin[0], at[1] - self.origin[1]);
-        let [a, b, c] = &self.parts;
-        let weight = |part: &[f64; 3]| part[0] + part[1] * x + part[2] * y;
-        let [u, v, w] = [weight(a), weight(b), weight(c)];
-        let sum = u + v + w;
-        let (inverse, weights) = match sum != 0.0 && sum.is_finite() {
-            true => {
-                let inverse = 1.0 / sum;
-                (inverse, [u * inverse, v * inverse, w * inverse])
-            }
-            false => (0.0, [1.0, 0.0, 0.0]),
-        };
-        let slope = |i: usize| {
-            let of_sum = a[i] + b[i] + c[i];
-            let of = |part: &[f64; 3], weight: f64| (part[i] - weight * of_sum) * inverse;
-            [of(a, weights[0]), of(b, weights[1]), of(c, weights[2])]
-        };
-        Spot {
-            face: self.face as usize,
-            weights,
-            right: slope(1),
-            down: slope(2),
-        }
-    }
-
-    /// The unit normal towards the eye at a place of the picture.
-    pub fn normal(&self, at: [f64; 2]) -> Vec3 {
-        let (x, y) = (at[0] - self.origin[0], at[1] - self.origin[1]);
-        let [first, right, down] = &self.normal;
-        unit(along(along(*first, x, *right), y, *down))
-    }
 }
 
 /// What fills the rows of a band, one after the other.
@@ -290,6 +195,47 @@ impl<'a, const N: usize, P: Paint<N>> Brush<'a, N, P> {
             last => *last = Some(fresh()),
         }
         self.last.get_or_insert_with(fresh)
+    }
+}
+
+impl Studio {
+    /// The pictures of the surface in a paint, with marks on it.
+    pub fn draw<const N: usize>(&self, marks: &[Mark], paint: &impl Paint<N>) -> [RgbImage; N] {
+        let (size, count) = (self.size, self.faces.len() as u32);
+        // On the screen, with the radius in pixels.
+        let on_screen = |mark: &Mark| Mark {
+            ends: mark.ends.map(|p| self.camera.project(p)),
+            radius: mark.radius * size as f64,
+            ..*mark
+        };
+        let bars: Vec<Mark> = marks.iter().map(on_screen).collect();
+        let draw_band = |(b, mut pictures): (usize, [&mut [u8]; N])| {
+            let rows = b * BAND..((b + 1) * BAND).min(size);
+            let mut band = Band::new(size, rows.start * SAMPLES..rows.end * SAMPLES);
+            for &face in &self.in_band[b] {
+                band.draw(&self.on_screen(face), face);
+            }
+            for (object, bar) in (count..).zip(&bars) {
+                band.draw_bar(bar.ends, bar.radius, 1.0 / self.camera.zoom, object);
+            }
+            let mut brush = Brush::new(self, &bars, paint);
+            for (k, row) in rows.enumerate() {
+                let seen = &band.objects()[k * SAMPLES * size..][..SAMPLES * size];
+                let line = 3 * k * size..3 * (k + 1) * size;
+                let lines = pictures
+                    .each_mut()
+                    .map(|picture| &mut picture[line.clone()]);
+                brush.row(row, seen, lines);
+            }
+        };
+        let mut bytes: [Vec<u8>; N] = std::array::from_fn(|_| vec![0; 3 * size * size]);
+        let mut parts = bytes.each_mut().map(|b| b.chunks_mut(3 * size * BAND));
+        let bands: Vec<[&mut [u8]; N]> = (self.in_band.iter())
+            .map(|_| parts.each_mut().map(|part| part.next().unwrap_or_default()))
+            .collect();
+        bands.into_par_iter().enumerate().for_each(draw_band);
+        let side = size as u32;
+        bytes.map(|bytes| RgbImage::from_raw(side, side, bytes).unwrap_or_default())
     }
 }
 

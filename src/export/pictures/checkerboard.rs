@@ -1,6 +1,6 @@
 //! A checkerboard in flat coordinates that stays readable whatever the scale. On a grid it is that of `TEXCOORD_0`, whose squares are cells.
 
-use super::brush::Spot;
+use super::aspect::Spot;
 use super::colour::{Linear, mix};
 use crate::atlas::plane::{doubled_area, rotate};
 use crate::geometry::ids::{FaceId, VertexId};

@@ -15,6 +15,7 @@
 //! Not guaranteed: equal bytes on different platforms (sines and powers differ in the last bit).
 
 mod ambient;
+mod aspect;
 mod brush;
 mod canvas;
 pub(crate) mod checkerboard;

@@ -1,6 +1,7 @@
 //! Colours for the log scale: blue where the flat metric shrinks the surface, red where it grows.
 
-use super::brush::{Paint, Spot};
+use super::aspect::Spot;
+use super::brush::Paint;
 use super::checkerboard::{ascending, weighted_quantile};
 use super::colour::{INK, Linear, diverging, to_linear};
 use super::text;

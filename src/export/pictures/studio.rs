@@ -7,7 +7,7 @@
 //! Nearby parts of the surface take some of its light ([`Ambient`]).
 
 use super::ambient::{Ambient, COARSER};
-use super::brush::{Aspect, Brush, Paint, Spot};
+use super::aspect::{Aspect, Spot};
 use super::colour::{CUT, Linear, NEGATIVE, POSITIVE, to_linear};
 use super::floor::Floor;
 use super::light::Light;
@@ -16,12 +16,11 @@ use super::proxy::Proxy;
 use super::raster::{Band, NOTHING, SAMPLES, place, row_at, sparse};
 use super::view::{Camera, Vec3, along, choose_direction};
 use crate::geometry::mesh::{Mesh, dot, sub};
-use image::RgbImage;
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Rows of pixels that are drawn at a time.
-const BAND: usize = 32;
+pub(super) const BAND: usize = 32;
 /// Radius of a bar along the cut, in sides of the picture.
 const CUT_RADIUS: f64 = 0.0026;
 /// Radius of the ball at a cone, likewise.
@@ -29,9 +28,9 @@ const CONE_RADIUS: f64 = 0.0125;
 
 /// A ball or a bar with round ends, by the ends of its axis.
 pub(super) struct Mark {
-    ends: [Vec3; 2],
+    pub ends: [Vec3; 2],
     /// In sides of the picture.
-    radius: f64,
+    pub radius: f64,
     pub colour: Linear,
 }
 
@@ -59,7 +58,7 @@ impl Mark {
 
 /// The surface with its view and light, ready to be painted in several ways.
 pub(super) struct Studio {
-    camera: Camera,
+    pub camera: Camera,
     positions: Vec<Vec3>,
     pub faces: Vec<[u32; 3]>,
     /// Vertices on the screen.
@@ -69,7 +68,7 @@ pub(super) struct Studio {
     pub light: Light,
     pub ambient: Ambient,
     /// Faces that may be seen in each band of rows, in ascending order.
-    in_band: Vec<Vec<u32>>,
+    pub in_band: Vec<Vec<u32>>,
     /// Pixels along a side of the picture.
     pub size: usize,
 }
@@ -129,45 +128,6 @@ impl Studio {
         let points = (0..side * side).into_par_iter().map(point).collect();
         let picture = self.size as f64 * self.camera.depth / self.camera.zoom;
         Ambient::new(points, side, picture)
-    }
-
-    /// The pictures of the surface in a paint, with marks on it.
-    pub fn draw<const N: usize>(&self, marks: &[Mark], paint: &impl Paint<N>) -> [RgbImage; N] {
-        let (size, count) = (self.size, self.faces.len() as u32);
-        // On the screen, with the radius in pixels.
-        let on_screen = |mark: &Mark| Mark {
-            ends: mark.ends.map(|p| self.camera.project(p)),
-            radius: mark.radius * size as f64,
-            ..*mark
-        };
-        let bars: Vec<Mark> = marks.iter().map(on_screen).collect();
-        let draw_band = |(b, mut pictures): (usize, [&mut [u8]; N])| {
-            let rows = b * BAND..((b + 1) * BAND).min(size);
-            let mut band = Band::new(size, rows.start * SAMPLES..rows.end * SAMPLES);
-            for &face in &self.in_band[b] {
-                band.draw(&self.on_screen(face), face);
-            }
-            for (object, bar) in (count..).zip(&bars) {
-                band.draw_bar(bar.ends, bar.radius, 1.0 / self.camera.zoom, object);
-            }
-            let mut brush = Brush::new(self, &bars, paint);
-            for (k, row) in rows.enumerate() {
-                let seen = &band.objects()[k * SAMPLES * size..][..SAMPLES * size];
-                let line = 3 * k * size..3 * (k + 1) * size;
-                let lines = pictures
-                    .each_mut()
-                    .map(|picture| &mut picture[line.clone()]);
-                brush.row(row, seen, lines);
-            }
-        };
-        let mut bytes: [Vec<u8>; N] = std::array::from_fn(|_| vec![0; 3 * size * size]);
-        let mut parts = bytes.each_mut().map(|b| b.chunks_mut(3 * size * BAND));
-        let bands: Vec<[&mut [u8]; N]> = (self.in_band.iter())
-            .map(|_| parts.each_mut().map(|part| part.next().unwrap_or_default()))
-            .collect();
-        bands.into_par_iter().enumerate().for_each(draw_band);
-        let side = size as u32;
-        bytes.map(|bytes| RgbImage::from_raw(side, side, bytes).unwrap_or_default())
     }
 
     /// Corners of a face on the screen.

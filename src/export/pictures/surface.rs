@@ -1,6 +1,7 @@
 //! Pictures of an atlas in space.
 
-use super::brush::{Paint, Spot};
+use super::aspect::Spot;
+use super::brush::Paint;
 use super::checkerboard::{Checkerboard, FaceBoard};
 use super::colour::{CUT, INK, Linear, NEGATIVE, POSITIVE};
 use super::scale::{Coloured, Range};
