@@ -20,6 +20,8 @@ pub(super) const MOST_HALVINGS: usize = 30;
 const SQUEEZED: f64 = 50.0;
 /// Rounds over vertices of squeezed faces.
 const MOST_ROUNDS: usize = 30;
+/// Most moves: this part of the vertices, and so many besides. Where more are wanted, not a few faces are squeezed but the surface, and steps of all vertices together do better.
+const MOST_MOVES: (f64, usize) = (0.5, 10_000);
 /// Part of the energy around a vertex that it gains at least, to be looked at again.
 const LEAST_GAIN: f64 = 1e-3;
 
@@ -32,9 +34,13 @@ pub(super) fn widen(
     see: &mut dyn FnMut(&Places),
 ) {
     let mut squeezed = energy.above(SQUEEZED, place);
+    let mut left = MOST_MOVES.1 + (MOST_MOVES.0 * c.vertex_count() as f64) as usize;
     for _ in 0..MOST_ROUNDS {
         let mut touched = Vec::new();
-        for v in distinct(squeezed.iter().flat_map(|&f| c.face_vertices(f))) {
+        let mut vertices = distinct(squeezed.iter().flat_map(|&f| c.face_vertices(f)));
+        vertices.truncate(left);
+        left -= vertices.len();
+        for v in vertices {
             let star = distinct(c.outgoing(v).map(|h| c.face(h)));
             if move_vertex(energy, &star, v, place, is_free[v.index()]) {
                 touched.extend(star);
