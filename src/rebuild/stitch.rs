@@ -70,7 +70,7 @@ pub(super) fn stitch(
     }
     let mut suspects = Vec::new();
     let mut chords: FxHashMap<[u32; 2], (usize, usize)> = FxHashMap::default();
-    for (id, band) in bands.iter().enumerate() {
+    for (id, band) in bands.into_iter().enumerate() {
         let (base, n) = (mesh.vertex.len() as u32, band.polygon.uv.len() as u32);
         for (i, &(seam, point)) in band.polygon.point.iter().enumerate() {
             mesh.vertex.push(of_chain[seam][point]);
@@ -108,6 +108,7 @@ pub(super) fn stitch(
             break;
         }
     }
+    drop(thin);
     let mut faces = Faces {
         positions: &mesh.positions,
         vertex: &mesh.vertex,
@@ -244,14 +245,14 @@ impl Stitched {
             .iter()
             .map(|f| f.map(|c| self.vertex[c as usize]))
             .collect();
-        let connectivity =
-            Connectivity::from_faces(&faces, self.positions.len()).map_err(|error| {
-                RebuildError::NotManifold {
-                    problem: error.to_string(),
-                }
-            })?;
+        // Gone before coordinates are laid out: either takes as much memory as all the rest.
+        let topology = Connectivity::from_faces(&faces, self.positions.len())
+            .map_err(|error| RebuildError::NotManifold {
+                problem: error.to_string(),
+            })?
+            .topology();
         Ok(Rebuilt {
-            topology: connectivity.topology(),
+            topology,
             patch_uv: self
                 .faces
                 .iter()

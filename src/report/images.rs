@@ -46,16 +46,16 @@ pub fn measure_images(
         mesh.expect_topology(topology.euler_characteristic, topology.genus, loops)?;
         Ok(mesh)
     });
-    let mesh = match rebuilt {
-        Ok(mesh) => mesh,
+    let (positions, faces) = match rebuilt {
+        Ok(mesh) => (mesh.positions, mesh.faces),
         Err(error) => {
             tracing::warn!(%error, "the images could not be measured");
             return (quality, None);
         }
     };
     let rebuilt = Triangles {
-        positions: &mesh.positions,
-        faces: &mesh.faces,
+        positions: &positions,
+        faces: &faces,
     };
     let samples = (SAMPLES_OF_FACE * source.faces.len()).clamp(SAMPLES[0], SAMPLES[1]);
     let sampling = Sampling {

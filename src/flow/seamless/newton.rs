@@ -113,7 +113,15 @@ pub(super) fn solve(
                 &mut state,
             );
         }
-        history.push(record.at(&state));
+        let now = record.at(&state);
+        tracing::trace!(
+            step = now.iteration,
+            length = step,
+            energy = now.energy,
+            error = now.max_error,
+            "seamless metric"
+        );
+        history.push(now);
         last = Some(normal);
     }
     let broken = state.shape.iter().filter(|s| s.broken).count();
