@@ -14,7 +14,7 @@ const SAMPLES: [usize; 2] = [4_000, 10_000];
 const SAMPLES_OF_VERTEX: usize = 4;
 
 /// Images of so many texels are measured whatever was asked for, …
-const MEASURED_TEXELS: usize = 4_500_000;
+const MEASURED_TEXELS: usize = 3_500_000;
 /// … and so many times what was asked for: tens of thousands of patches have images of many more texels, and the mesh rebuilt from these fills the memory.
 const MEASURED_BUDGETS: usize = 2;
 
