@@ -155,6 +155,96 @@ fn verify_compares_sides() {
     assert!(said.contains(name), "{said}");
 }
 
+/// Cells of a quad mesh: area, and curvature towards the neighbour that it bends most to (angle between normals by distance).
+fn cells(atlas: &Path) -> Vec<[f64; 2]> {
+    let positions: Vec<f64> = array(atlas, "quad_positions");
+    let quads: Vec<u32> = array(atlas, "quads");
+    let quads = quads.as_chunks::<4>().0;
+    let at = |v: u32| -> [f64; 3] { std::array::from_fn(|i| positions[3 * v as usize + i]) };
+    let sub = |a: [f64; 3], b: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| a[i] - b[i]) };
+    let norm = |a: [f64; 3]| a.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let of_cell = |q: &[u32; 4]| {
+        let (a, b) = (sub(at(q[2]), at(q[0])), sub(at(q[3]), at(q[1])));
+        let normal = [0, 1, 2].map(|i| {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            a[j] * b[k] - a[k] * b[j]
+        });
+        let doubled = norm(normal);
+        let centre = [0, 1, 2].map(|i| q.iter().map(|&v| at(v)[i]).sum::<f64>() / 4.0);
+        (0.5 * doubled, normal.map(|x| x / doubled), centre)
+    };
+    let shapes: Vec<_> = quads.iter().map(of_cell).collect();
+    let mut found: Vec<[f64; 2]> = shapes.iter().map(|s| [s.0, 0.0]).collect();
+    let mut sides = std::collections::HashMap::new();
+    for (q, corners) in quads.iter().enumerate() {
+        for k in 0..4 {
+            let (a, b) = (corners[k], corners[(k + 1) % 4]);
+            sides.insert((a, b), q);
+            if let Some(&other) = sides.get(&(b, a)) {
+                let ((_, m, c), (_, n, d)) = (shapes[q], shapes[other]);
+                let cosine: f64 = m.iter().zip(n).map(|(x, y)| x * y).sum();
+                let curvature = cosine.clamp(-1.0, 1.0).acos() / norm(sub(c, d));
+                for cell in [q, other] {
+                    found[cell][1] = found[cell][1].max(curvature);
+                }
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn cells_are_as_long_as_asked_for() {
+    let mesh = Path::new("fixtures/good/genus-3-pretzel.obj");
+    for size in [0.2, 0.05] {
+        let built = build(
+            mesh,
+            &["report.enabled=false", &format!("grid.cell_size={size}")],
+        );
+        let atlas = built.atlas();
+        let stated = document(&atlas)["grid"]["cell_size"].as_f64();
+        let areas: Vec<f64> = cells(&atlas).iter().map(|c| c[0]).collect();
+        let mean = areas.iter().sum::<f64>() / areas.len() as f64;
+        for (what, found) in [
+            ("stated", stated.expect("a size")),
+            ("measured", mean.sqrt()),
+        ] {
+            assert!(
+                (found / size - 1.0).abs() < 0.05,
+                "{found} {what} for {size}"
+            );
+        }
+    }
+}
+
+#[test]
+fn cells_are_smaller_where_the_surface_is_curved() {
+    let mesh = Path::new("fixtures/good/genus-0-animal.ply");
+    // The cells on the most curved fifth of the surface against all, and how many there are.
+    let curved = |density: &str| {
+        let settings = ["report.enabled=false", &format!("grid.density={density}")];
+        let built = build(mesh, &settings);
+        let mut cells = cells(&built.atlas());
+        cells.sort_by(|a, b| b[1].total_cmp(&a[1]));
+        let whole: f64 = cells.iter().map(|c| c[0]).sum();
+        let mut area = 0.0;
+        let most = cells.iter().position(|c| {
+            area += c[0];
+            area > 0.2 * whole
+        });
+        (
+            area / most.expect("a fifth") as f64 / (whole / cells.len() as f64),
+            cells.len(),
+        )
+    };
+    let (uniform, by_curvature) = (curved("uniform"), curved("curvature"));
+    assert_eq!(uniform.1, by_curvature.1);
+    assert!(
+        by_curvature.0 < 0.97 * uniform.0,
+        "{by_curvature:?} against {uniform:?}"
+    );
+}
+
 #[test]
 fn the_same_bytes_for_any_number_of_threads() {
     let mesh = Path::new("fixtures/good/genus-2-amphora.glb");
