@@ -175,8 +175,48 @@ fn made(
     let turns: HalfedgeVec<u8> = c.halfedges().map(|h| flat.side(h).turns).collect();
     let cones = cone_triangulation::reduce(flat, c.vertex_count())?;
     drop(part);
+    let surface = Flattened {
+        mesh,
+        central,
+        lines,
+        turns,
+        cones,
+    };
+    let cells = params.cells as f64;
+    let mut grids =
+        TARGETS.map(|part| move |s: &Flattened| of_cells(s, params, part * cells, gutter));
+    let [first, others @ ..] = &mut grids;
+    first(&surface).or_else(|error| match error {
+        GridError::TurnedOver { .. } => {
+            let another = others.iter_mut().find_map(|grid| grid(&surface).ok());
+            another.ok_or(error)
+        }
+        _ => Err(error),
+    })
+}
+
+/// A surface on the plane and its cones.
+struct Flattened<'a> {
+    mesh: &'a Mesh,
+    central: &'a FaceVec<[[f64; 2]; 3]>,
+    lines: &'a EdgeVec<bool>,
+    turns: HalfedgeVec<u8>,
+    cones: cone_triangulation::ConeTriangulation,
+}
+
+/// Parts of the number of cells that are asked for in turn, as long as faces are turned over: other whole numbers leave them other room.
+const TARGETS: [f64; 5] = [1.0, 1.05, 0.95, 1.1, 0.9];
+
+/// The grid of about so many cells.
+fn of_cells(
+    surface: &Flattened,
+    params: &GridParams,
+    wanted: f64,
+    gutter: usize,
+) -> Result<(GridMap, Grid, layout::Located), GridError> {
+    let Flattened { mesh, cones, .. } = surface;
+    let c = &mesh.connectivity;
     let part = part!("quantise");
-    let wanted = params.cells as f64;
     let mut lattice = quantise::quantise(&cones.complex, cones.vertex.len(), wanted)?;
     let mut quads = lattice.quads()?;
     for halvings in 1..=MOST_HALVINGS {
@@ -202,16 +242,23 @@ fn made(
     let part = part!("affine map");
     let mut fine = Subdivision::identity(mesh);
     for h in c.halfedges() {
-        fine.corner[h].uv = central[c.face(h)][c.corner(h)];
+        fine.corner[h].uv = surface.central[c.face(h)][c.corner(h)];
     }
     // Cones, and what lies on lines of the lattice.
     let mut is_kept = VertexVec::filled(false, c.vertex_count());
     cones.vertex.iter().for_each(|&v| is_kept[v] = true);
-    for (e, _) in lines.enumerate().filter(|(_, is_line)| **is_line) {
+    for (e, _) in surface.lines.enumerate().filter(|(_, is_line)| **is_line) {
         c.edge_vertices(e).iter().for_each(|&v| is_kept[v] = true);
     }
     let may_move = |v: VertexId| v.index() >= is_kept.len() || !is_kept[v];
-    let mut map = map::affine(fine, turns, &lattice, &cones.vertex, &quads, may_move)?;
+    let mut map = map::affine(
+        fine,
+        surface.turns.clone(),
+        &lattice,
+        &cones.vertex,
+        &quads,
+        may_move,
+    )?;
     slivers::thicken(&mut map);
     let areas = c.faces().map(|f| triangle_area(mesh.face_positions(f)));
     let cell_size = (areas.sum::<f64>() / quads.quads.len() as f64).sqrt();
