@@ -6,6 +6,8 @@ use crate::flow::step::FlowStep;
 pub trait Observer: Sync {
     /// A stage begins. `component` counts from 0 of `components`.
     fn stage(&self, _name: &'static str, _component: usize, _components: usize) {}
+    /// The last stage of a component is over.
+    fn finished(&self, _component: usize, _components: usize) {}
     /// The flow took a step.
     fn flow_step(&self, _step: &FlowStep) {}
     /// True where the job should stop as soon as it can.

@@ -11,8 +11,10 @@ use crate::flow::step::FlowStep;
 use crate::job;
 use crate::observe::Observer;
 use crate::outcome::AssetOutcome;
+use crate::parallel;
 use crate::read;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::io::{self, BufRead, Read, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -87,7 +89,7 @@ pub struct Part {
     pub name: String,
     /// Component, from 0; of stages.
     pub component: Option<usize>,
-    /// The thread: 0, or one of the pool, from 1.
+    /// The thread: 0, one of the pool, from 1, or one beside it.
     pub thread: usize,
     /// When it began, microseconds since 1970.
     pub begin: u64,
@@ -104,7 +106,7 @@ impl Part {
         Self {
             name: name.to_owned(),
             component,
-            thread: rayon::current_thread_index().map_or(0, |i| i + 1),
+            thread: parallel::thread_number(),
             begin: microseconds(begin.duration_since(SystemTime::UNIX_EPOCH)),
             microseconds: microseconds(begin.elapsed()),
         }
@@ -163,7 +165,7 @@ pub fn work(job: &Job, path: &Path, output: &Path) -> AssetOutcome {
         // What failed may have failed because its files were removed. The lifeline ends this process.
         std::thread::park();
     }
-    told.leave();
+    told.leave_all();
     outcome.look_for_older(output);
     outcome.peak_memory = limits::peak_memory();
     outcome.host = limits::host();
@@ -185,7 +187,8 @@ pub fn work(job: &Job, path: &Path, output: &Path) -> AssetOutcome {
 /// Passes on what the job tells, and logs how long each stage took.
 struct Told<'j> {
     job: &'j Job,
-    stage: Mutex<Option<(&'static str, usize, SystemTime, Instant)>>,
+    /// The stage of each component that is under way.
+    stage: Mutex<BTreeMap<usize, (&'static str, SystemTime, Instant)>>,
     step: Mutex<Option<Instant>>,
 }
 
@@ -198,10 +201,10 @@ impl<'j> Told<'j> {
         }
     }
 
-    /// The stage that was under way is over.
-    fn leave(&self) {
-        let mut stage = self.stage.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((name, component, begin, since)) = stage.take() {
+    /// The stage of a component that was under way is over.
+    fn leave(&self, component: usize) {
+        let mut stages = self.stage.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((name, begin, since)) = stages.remove(&component) {
             if self.job.voice.parts {
                 send(&Event::Part(Part::since(name, Some(component), begin)));
             }
@@ -217,16 +220,33 @@ impl<'j> Told<'j> {
     }
 }
 
+impl Told<'_> {
+    /// All stages are over.
+    fn leave_all(&self) {
+        let stages = self.stage.lock().unwrap_or_else(PoisonError::into_inner);
+        let under_way: Vec<usize> = stages.keys().copied().collect();
+        drop(stages);
+        under_way
+            .into_iter()
+            .for_each(|component| self.leave(component));
+    }
+}
+
 impl Observer for Told<'_> {
     fn stage(&self, name: &'static str, component: usize, components: usize) {
-        self.leave();
-        *self.stage.lock().unwrap_or_else(PoisonError::into_inner) =
-            Some((name, component, SystemTime::now(), Instant::now()));
+        self.leave(component);
+        let mut stages = self.stage.lock().unwrap_or_else(PoisonError::into_inner);
+        stages.insert(component, (name, SystemTime::now(), Instant::now()));
+        drop(stages);
         send(&Event::Stage {
             name: name.to_owned(),
             component,
             components,
         });
+    }
+
+    fn finished(&self, component: usize, _: usize) {
+        self.leave(component);
     }
 
     fn flow_step(&self, step: &FlowStep) {

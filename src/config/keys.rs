@@ -603,6 +603,15 @@ pub const KEYS: &[Key] = &[
         "500000",
     ),
     key(
+        "report.max_components",
+        Kind::Integer {
+            min: 0,
+            max: 1_000_000,
+        },
+        "components",
+        "16",
+    ),
+    key(
         "report.distortion_warning",
         Kind::Number {
             min: 0.0,

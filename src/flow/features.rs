@@ -6,13 +6,18 @@
 pub mod file;
 
 use crate::geometry::disjoint_sets::UnionFind;
-use crate::geometry::ids::{EdgeId, EdgeVec, VertexId, VertexVec};
+use crate::geometry::ids::{EdgeId, EdgeVec, HalfedgeId, VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, cross, dot, sub, triangle_area};
 use std::cmp::Ordering;
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::PathBuf;
 
-/// Fewest edges of a chain that counts where nobody named them: shorter ones are mostly noise.
+/// Fewest edges of a chain that counts where nobody named them: shorter ones are mostly noise, …
 pub const LEAST_EDGES: usize = 5;
+/// … unless they are as long as this, in square roots of the surface's area, and meet others at quarter turns: edges of a box.
+pub const LONG: f64 = 0.05;
+/// How far from a multiple of a quarter turn, radians, the surface may turn between such a chain and the next sharp edge.
+const OFF_QUARTER: f64 = 20.0 / 180.0 * PI;
 /// And its least length, in square roots of the surface's area: about a side of the cells when there are 2,000. What is shorter has no place in a grid, however
 /// many edges it has.
 pub const LEAST_LENGTH: f64 = 0.02;
@@ -91,7 +96,9 @@ pub fn features(mesh: &Mesh, params: &FeatureParams, named: &[EdgeId]) -> Vec<Fe
         .map(|f| triangle_area(mesh.face_positions(f)))
         .sum();
     let counts = |f: &Feature| {
-        f.edges.len() >= LEAST_EDGES && f.length >= LEAST_LENGTH * area.sqrt()
+        let length = f.length / area.sqrt();
+        f.edges.len() >= LEAST_EDGES && length >= LEAST_LENGTH
+            || length >= LONG && meets_at_quarter_turns(mesh, &sharp, f)
             || f.edges.iter().any(|&e| is_named[e])
     };
     let mut found: Vec<Feature> = chains(mesh, &sharp)
@@ -116,6 +123,59 @@ pub fn features(mesh: &Mesh, params: &FeatureParams, named: &[EdgeId]) -> Vec<Fe
     let (mut forest, cycles): (Vec<_>, Vec<_>) = found.into_iter().partition(joins);
     forest.extend(cycles);
     forest
+}
+
+/// Whether lines along a chain and along the sharp edges and borders that it meets at both ends would turn no face by much: between it and the next, the surface
+/// turns by about quarter turns.
+fn meets_at_quarter_turns(mesh: &Mesh, sharp: &EdgeVec<bool>, f: &Feature) -> bool {
+    let c = &mesh.connectivity;
+    let ends = [
+        (f.vertices.first(), f.edges.first()),
+        (f.vertices.last(), f.edges.last()),
+    ];
+    let is_line = |e: EdgeId| sharp[e] || c.is_boundary_edge(e);
+    let is_quarter = |turn: f64| {
+        let quarters = (turn / FRAC_PI_2).round().max(1.0);
+        (turn - quarters * FRAC_PI_2).abs() <= OFF_QUARTER
+    };
+    ends.into_iter().all(|(v, e)| {
+        let (Some(&v), Some(&e)) = (v, e) else {
+            return false;
+        };
+        let mut around: Vec<HalfedgeId> = c.outgoing(v).collect();
+        let Some(at) = around.iter().position(|&h| c.edge(h) == e) else {
+            return false;
+        };
+        let sum = |part: &[HalfedgeId]| part.iter().map(|&h| corner_angle(mesh, h)).sum::<f64>();
+        let is_line = |h: &HalfedgeId| is_line(c.edge(*h));
+        let is_end = around.iter().filter(|h| is_line(h)).count() < 3;
+        if is_end && !c.is_boundary_vertex(v) {
+            return false;
+        }
+        // Counterclockwise from this edge to the next line, and clockwise.
+        let (left, right) = match c.is_boundary_vertex(v) {
+            true => around.split_at(at),
+            false => {
+                around.rotate_left(at);
+                (&around[..0], &around[..])
+            }
+        };
+        let next = right.iter().skip(1).position(is_line);
+        let next = next.map_or(right.len(), |i| i + 1);
+        let before = if left.is_empty() { right } else { left };
+        let last = before.iter().rposition(is_line).unwrap_or(0);
+        is_quarter(sum(&right[..next])) && is_quarter(sum(&before[last..]))
+    })
+}
+
+/// The angle of a face at the tail of a halfedge, radians; 0 where it has none.
+fn corner_angle(mesh: &Mesh, h: HalfedgeId) -> f64 {
+    let c = &mesh.connectivity;
+    let at = |v: VertexId| mesh.positions[v];
+    let (p, q, r) = (at(c.tail(h)), at(c.head(h)), at(c.apex(h)));
+    let (a, b) = (sub(q, p), sub(r, p));
+    let across = cross(a, b);
+    dot(across, across).sqrt().atan2(dot(a, b))
 }
 
 /// The angle between the normals of both sides, radians; 0 on the boundary and where a face has no normal.
@@ -212,6 +272,7 @@ fn feature(mesh: &Mesh, bend: &EdgeVec<f64>, vertices: Vec<VertexId>) -> Feature
 mod tests {
     use super::*;
     use crate::geometry::mesh::Soup;
+    use crate::geometry::polycube::polycube;
     use crate::repair::{RepairParams, repair};
 
     /// A unit square with two squares of other materials, of sides 0.5 and 0.004, each between grid lines with `n` edges on every side.
@@ -243,6 +304,29 @@ mod tests {
         let repaired = repair(&soup, &RepairParams::default()).expect("a plain square");
         let first = repaired.components.into_iter().next().expect("one");
         first.mesh.expect("connected")
+    }
+
+    fn surface(positions: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Mesh {
+        let soup = Soup::from_triangles(positions, faces);
+        let repaired = repair(&soup, &RepairParams::default()).expect("a plain surface");
+        let first = repaired.components.into_iter().next().expect("one");
+        first.mesh.expect("connected")
+    }
+
+    #[test]
+    fn single_edges_count_where_lines_along_them_are_natural() {
+        let sharp = |mesh: &Mesh| features(mesh, &FeatureParams::default(), &[]).len();
+        // All edges of a box, whichever way its sides are divided.
+        let cube = polycube([[0, 0, 0]], |_, _, _| true);
+        assert_eq!(sharp(&cube), 12);
+        // Without a side: nothing is lost but the border.
+        let faces = cube.connectivity.to_faces();
+        let open = surface(cube.positions.as_slice().to_vec(), faces[2..].to_vec());
+        assert_eq!(sharp(&open), 8);
+        // Faces of a tetrahedron have corners of 45° and 60°.
+        let corners = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let faces = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+        assert_eq!(sharp(&surface(corners, faces)), 0);
     }
 
     #[test]

@@ -187,7 +187,7 @@ fn made(
         TARGETS.map(|part| move |s: &Flattened| of_cells(s, params, part * cells, gutter));
     let [first, others @ ..] = &mut grids;
     first(&surface).or_else(|error| match error {
-        GridError::TurnedOver { .. } => {
+        GridError::TurnedOver { .. } | GridError::Lost { .. } => {
             let another = others.iter_mut().find_map(|grid| grid(&surface).ok());
             another.ok_or(error)
         }
@@ -204,7 +204,7 @@ struct Flattened<'a> {
     cones: cone_triangulation::ConeTriangulation,
 }
 
-/// Parts of the number of cells that are asked for in turn, as long as faces are turned over: other whole numbers leave them other room.
+/// Parts of the number of cells that are asked for in turn, as long as faces are turned over or lines are lost: other whole numbers leave them other room.
 const TARGETS: [f64; 5] = [1.0, 1.05, 0.95, 1.1, 0.9];
 
 /// The grid of about so many cells.

@@ -1,6 +1,8 @@
 //! Small meshes with enough vertices for the cones of a grid.
 //!
-//! *Enters:* a mesh. *Leaves:* the same surface, whose longest edges are halved one after another until it has enough faces. *Guaranteed:* new vertices lie on old edges, old ones keep their numbers.
+//! *Enters:* a mesh. *Leaves:* the same surface, whose longest edges are divided into three one after another until it has enough faces. *Guaranteed:* new vertices lie on old edges, old ones keep their numbers.
+//!
+//! Halves would lie where texels of a cell lie, too: these would be on edges of faces, which say little of them.
 //!
 //! A tetrahedron needs eight cones of three quarter turns and has four vertices; a triangle needs one inside and has none there.
 
@@ -38,10 +40,16 @@ pub(crate) fn refined(mesh: Mesh) -> Mesh {
         if bits != length(&fine, e).to_bits() {
             continue;
         }
-        let v = fine.split_edge(e, 0.5);
+        let [_, end] = fine.connectivity.edge_vertices(e);
+        let first = fine.split_edge(e, 1.0 / 3.0);
         let c = &fine.connectivity;
-        let around: Vec<EdgeId> = c
-            .outgoing(v)
+        let rest = c.outgoing(first).find(|&h| c.head(h) == end);
+        let second = rest.map(|h| c.edge(h)).map(|e| fine.split_edge(e, 0.5));
+        let c = &fine.connectivity;
+        let around: Vec<EdgeId> = [Some(first), second]
+            .into_iter()
+            .flatten()
+            .flat_map(|v| c.outgoing(v))
             .flat_map(|h| [c.edge(h), c.edge(c.prev(h))])
             .collect();
         for e in around {
@@ -69,7 +77,7 @@ mod tests {
         let (vertices, before) = (mesh.positions.len(), area(&mesh));
         let topology = mesh.connectivity.topology();
         let fine = refined(mesh.clone());
-        assert!((FACES..FACES + 2).contains(&fine.connectivity.face_count()));
+        assert!((FACES..FACES + 4).contains(&fine.connectivity.face_count()));
         assert!((area(&fine) - before).abs() < 1e-12);
         assert_eq!(
             fine.positions.as_slice()[..vertices],

@@ -5,8 +5,10 @@
 //! [`inspect`] stops before the flow, [`survey`] tries different cones, [`rebuild`] goes back from images to a mesh, [`fit`] on to a
 //! spline surface, [`texture`] lays a pattern over the surface, [`explain`] says what is wrong.
 
+mod assembly;
 mod charting;
 mod checks;
+mod components;
 mod error;
 pub mod explain;
 pub mod fit;
@@ -26,21 +28,17 @@ pub use error::{BuildError, Unverified};
 pub use inspect::{Inspection, inspect};
 pub use precision::{Cause, Precision};
 
+use assembly::Assembly;
 use flatten::refine_for;
-use pipeline::pipeline;
 use publication::Publication;
-use warnings::warnings;
 
-use crate::atlas::patch::Domain;
 use crate::config::Config;
 use crate::export::folder::list_files;
-use crate::flow::cones;
 use crate::geometry::mesh::Soup;
 use crate::observe::Observer;
-use crate::outcome::{AssetOutcome, AssetState, ComponentOutcome, Failure, Summary};
+use crate::outcome::{AssetOutcome, AssetState, Failure};
 use crate::product::AffineAtlas;
 use crate::read;
-use crate::repair;
 use std::path::Path;
 use std::time::Instant;
 
@@ -53,81 +51,17 @@ pub fn build(
     observer: &dyn Observer,
 ) -> Result<Vec<Result<AffineAtlas, BuildError>>, BuildError> {
     let mut atlases = Vec::new();
-    each(soup, config, observer, |part| {
-        atlases.push(part.atlas);
-        Ok(())
-    })?;
+    components::each(
+        soup,
+        config,
+        observer,
+        |part| part.atlas(),
+        |atlas| {
+            atlases.push(atlas);
+            Ok(())
+        },
+    )?;
     Ok(atlases)
-}
-
-/// What became of one component.
-struct Part<'a> {
-    index: usize,
-    /// Of the mesh.
-    components: usize,
-    /// With its share of texels and pixels.
-    config: &'a Config,
-    atlas: Result<AffineAtlas, BuildError>,
-    /// Builds it of flat patches, for this reason.
-    without_grid: &'a dyn Fn(String) -> Result<AffineAtlas, BuildError>,
-}
-
-/// Builds one component after the other and hands each on before it begins the next, so that no more than one atlas need be in memory.
-fn each(
-    soup: &Soup,
-    config: &Config,
-    observer: &dyn Observer,
-    mut take: impl FnMut(Part<'_>) -> Result<(), BuildError>,
-) -> Result<(), BuildError> {
-    observer.stage("repair", 0, 1);
-    let repaired = repair::repair(soup, &config.repair)?;
-    let config = config.clone().resolved()?;
-    let config = &Config {
-        images: config.images.held_by(soup),
-        ..config
-    };
-    let assigned = |c: &Config| cones::assign(&repaired, &c.cones, &c.boundary, &c.features);
-    let requests = assigned(config)?;
-    let otherwise = assigned(&config.on_flat_patches())?;
-    let shares = shares::shares(&repaired.components);
-    let components = repaired.components.len();
-    let parts = repaired
-        .components
-        .into_iter()
-        .zip(requests)
-        .zip(otherwise)
-        .zip(shares);
-    for (index, (((component, requests), otherwise), share)) in parts.enumerate() {
-        let config = &shares::of_share(config, share)?;
-        let stages = Observed {
-            observer,
-            component: index,
-            components,
-        };
-        let enter = |stage| stages.enter(stage);
-        let flat = config.on_flat_patches();
-        let spare = component.clone();
-        let without_grid = |reason: String| {
-            let spare = spare.clone();
-            pipeline(spare, &otherwise, &flat, Some(reason), observer, &enter)
-        };
-        let is_sound = component.mesh.is_ok();
-        let atlas = match pipeline(component, &requests, config, None, observer, &enter) {
-            Err(BuildError::Cancelled) => Err(BuildError::Cancelled),
-            Err(error) if is_sound && config.domain() == Domain::Grid => {
-                without_grid(error.to_string())
-            }
-            atlas => atlas,
-        };
-        take(Part {
-            index,
-            components,
-            config,
-            atlas,
-            without_grid: &without_grid,
-        })?;
-    }
-    Ok(())
 }
 
 /// The last part of a folder's name; one that is given as `.` has one, too.
@@ -135,24 +69,6 @@ fn folder_name(folder: &Path) -> String {
     let resolved = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
     let name = resolved.file_name().unwrap_or("surface".as_ref());
     name.to_string_lossy().into_owned()
-}
-
-/// Who watches which component.
-struct Observed<'a> {
-    observer: &'a dyn Observer,
-    component: usize,
-    components: usize,
-}
-
-impl Observed<'_> {
-    /// Tells that a stage begins, unless the job was to stop.
-    fn enter(&self, stage: &'static str) -> Result<(), BuildError> {
-        if self.observer.cancelled() {
-            return Err(BuildError::Cancelled);
-        }
-        self.observer.stage(stage, self.component, self.components);
-        Ok(())
-    }
 }
 
 /// Reads, builds and writes one asset into `output/id`. `given` is the path as the user wrote it.
@@ -198,50 +114,31 @@ fn run_stages(
         tracing::warn!(asset = outcome.id, channel = channel.name(), "{note}");
         outcome.notes.push(note);
     }
-    let folder = output.join(&outcome.id);
     let id = outcome.id.clone();
-    let mut publication = Publication::new(&asset, given, output, &id, config, observer);
+    let publication = Publication::new(&asset, given, output, &id, config, observer);
+    let mut assembly = Assembly::default();
     let mut parts = Vec::new();
-    each(&asset.soup, config, observer, |part| {
-        let Part {
-            index, components, ..
-        } = part;
-        let result = match part.atlas {
-            Err(BuildError::Cancelled) => return Err(BuildError::Cancelled),
-            Err(error) => {
-                publication.leave_out(index, components);
-                Err(error)
+    components::each(
+        &asset.soup,
+        config,
+        observer,
+        |part| publication.component(part),
+        |published| {
+            let published = published?;
+            for note in &published.notes {
+                let note = match published.components {
+                    1 => format!("{given} {note}"),
+                    _ => format!("component {} of {given} {note}", published.index),
+                };
+                tracing::warn!(asset = id, "{note}");
+                outcome.notes.push(note);
             }
-            Ok(mut atlas) => {
-                let mut added = publication.add(index, components, &mut atlas, part.config)?;
-                if let (Err(error), true) = (&added, atlas.grid.is_some()) {
-                    match (part.without_grid)(error.to_string()) {
-                        Err(BuildError::Cancelled) => return Err(BuildError::Cancelled),
-                        Err(error) => added = Err(error),
-                        Ok(flat) => {
-                            atlas = flat;
-                            added = publication.add(index, components, &mut atlas, part.config)?;
-                        }
-                    }
-                }
-                for note in warnings(&atlas, part.config) {
-                    let note = match components {
-                        1 => format!("{given} {note}"),
-                        _ => format!("component {index} of {given} {note}"),
-                    };
-                    tracing::warn!(asset = id, "{note}");
-                    outcome.notes.push(note);
-                }
-                let folder = folder.join(Publication::subfolder(index, components));
-                added.map(|()| Summary::of(&atlas, folder))
-            }
-        };
-        let result = result.map_err(|error| Failure::from(&error));
-        parts.push(ComponentOutcome { index, result });
-        Ok(())
-    })?;
-    publication.finish()?;
-    outcome.files = list_files(&folder).unwrap_or_default();
+            parts.push(assembly.add(published));
+            Ok(())
+        },
+    )?;
+    assembly.finish(publication, config)?;
+    outcome.files = list_files(&output.join(&id)).unwrap_or_default();
     outcome.components = parts;
     Ok(())
 }

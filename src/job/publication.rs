@@ -1,44 +1,66 @@
 //! The folder of an asset, filled component by component.
 //!
-//! *Enters:* one atlas after the other. *Leaves:* a folder that replaces the older one in one step. What does not pass the checks of
-//! [`verify`](crate::verify) is not published; an older one stays in its place.
+//! *Enters:* components in any order, several at a time. *Leaves:* their folders in a staging folder, which an [`Assembly`](super::assembly::Assembly) completes and puts in
+//! place. What does not pass the checks of [`verify`](crate::verify) is not published; an older one stays in its place.
 
+use super::components::Part;
 use super::error::{BuildError, Unverified};
 use super::precision::Precision;
+use super::warnings::warnings;
 use crate::config::Config;
-use crate::export::atlas_json::FORMAT_VERSION;
 use crate::export::folder::{Staging, component_name};
-use crate::export::glb::whole::Whole;
-use crate::export::{self, ExportError, Provenance, pictures, report as report_page};
+use crate::export::{self, ExportError, Provenance, glb, pictures, report as report_page};
 use crate::observe::{Observer, part};
+use crate::outcome::Summary;
 use crate::product::AffineAtlas;
 use crate::read::SourceAsset;
-use crate::verify::{Extent, VerifyOptions, verify_atlas_and_measure, verify_whole};
-use std::collections::BTreeMap;
+use crate::verify::{Extent, VerifyOptions, verify_atlas_and_measure};
 use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// What all components of an asset are written with.
 pub(super) struct Publication<'a> {
-    asset: &'a SourceAsset,
-    given: &'a str,
+    pub asset: &'a SourceAsset,
+    /// The path as the user wrote it.
+    pub given: &'a str,
     output: &'a Path,
-    id: &'a str,
+    pub id: &'a str,
     config_blake3: String,
     observer: &'a dyn Observer,
     /// Made for the first atlas: where there is none, nothing is touched.
-    staging: Option<Staging>,
-    /// Whether any atlas passed.
-    new: bool,
-    /// Subfolders of components that have no atlas.
-    missing: Vec<String>,
-    /// All that passed, where there are several, …
-    whole: Whole,
-    /// … and what a file of them is compared with.
-    extents: BTreeMap<usize, Extent>,
+    staging: Mutex<Option<Arc<Staging>>>,
+}
+
+/// What became of a component.
+pub(super) struct Published {
+    pub index: usize,
+    pub components: usize,
+    /// What it says beside that it is there.
+    pub notes: Vec<String>,
+    pub result: Result<Summary, BuildError>,
+    /// What is shown of it beside the others, where there are several and it passed.
+    pub shown: Option<Shown>,
+    /// Whether it had no atlas at all: an older one stays.
+    pub is_missing: bool,
+}
+
+/// What files of the whole asset show of a component.
+pub(super) struct Shown {
+    pub surface: glb::Surface,
+    /// Texels around its patches.
+    pub padding: usize,
+    pub extent: Extent,
+    pub exhibit: Option<pictures::Exhibit>,
+    /// Cells of its grid.
+    pub cells: Option<usize>,
+    /// Decibels.
+    pub psnr: Option<f64>,
+    /// Whether it has a page of its own.
+    pub has_page: bool,
 }
 
 impl<'a> Publication<'a> {
-    /// A folder `output/id` that nothing has been written for. `given` is the path as the user wrote it.
+    /// A folder `output/id` that nothing has been written for.
     pub fn new(
         asset: &'a SourceAsset,
         given: &'a str,
@@ -54,11 +76,7 @@ impl<'a> Publication<'a> {
             id,
             config_blake3: config.hash(),
             observer,
-            staging: None,
-            new: false,
-            missing: Vec::new(),
-            whole: Whole::default(),
-            extents: BTreeMap::new(),
+            staging: Mutex::default(),
         }
     }
 
@@ -70,29 +88,74 @@ impl<'a> Publication<'a> {
         }
     }
 
-    /// Notes that a component has no atlas: an older one of it stays.
-    pub fn leave_out(&mut self, component: usize, components: usize) {
-        self.missing.push(Self::subfolder(component, components));
+    /// Builds a component, of flat patches where its grid does not pass, and writes it.
+    ///
+    /// # Errors
+    /// What concerns the whole asset: it was cancelled, or cannot be written.
+    pub fn component(&self, part: &Part<'_>) -> Result<Published, BuildError> {
+        let (index, components, config) = (part.index, part.components, &part.config);
+        let published = |result, notes, shown| Published {
+            index,
+            components,
+            notes,
+            result,
+            shown,
+            is_missing: false,
+        };
+        let mut atlas = match part.atlas() {
+            Ok(atlas) => atlas,
+            Err(BuildError::Cancelled) => return Err(BuildError::Cancelled),
+            Err(error) => {
+                return Ok(Published {
+                    is_missing: true,
+                    ..published(Err(error), Vec::new(), None)
+                });
+            }
+        };
+        let mut added = self.add(index, components, &mut atlas, config)?;
+        if let (Err(error), true) = (&added, atlas.grid.is_some()) {
+            let reason = error.to_string();
+            for other in part
+                .on_other_grids()
+                .chain(std::iter::once_with(|| part.without_grid(reason)))
+            {
+                match other {
+                    Err(BuildError::Cancelled) => return Err(BuildError::Cancelled),
+                    Err(error) => added = Err(error),
+                    Ok(other) => {
+                        atlas = other;
+                        added = self.add(index, components, &mut atlas, config)?;
+                    }
+                }
+                if added.is_ok() {
+                    break;
+                }
+            }
+        }
+        let notes = warnings(&atlas, config);
+        let folder = self.output.join(self.id);
+        let folder = folder.join(Self::subfolder(index, components));
+        Ok(match added {
+            Ok(shown) => published(Ok(Summary::of(&atlas, folder)), notes, shown),
+            Err(error) => published(Err(error), notes, None),
+        })
     }
 
     /// Writes the atlas of a component, checks it and draws it; its images, which nothing else asks for, are gone then. The inner error says why it is
     /// not published.
-    pub fn add(
-        &mut self,
+    fn add(
+        &self,
         component: usize,
         components: usize,
         atlas: &mut AffineAtlas,
         config: &Config,
-    ) -> Result<Result<(), BuildError>, ExportError> {
+    ) -> Result<Result<Option<Shown>, BuildError>, ExportError> {
         let observer = self.observer;
         let go_on = || match observer.cancelled() {
             true => Err(ExportError::Interrupted),
             false => Ok(()),
         };
-        let staging = match &mut self.staging {
-            Some(staging) => &*staging,
-            none => &*none.insert(Staging::begin(self.output, self.id)?),
-        };
+        let staging = &*self.staging()?;
         let subfolder = Self::subfolder(component, components);
         let provenance = Provenance {
             path: self.given,
@@ -135,21 +198,18 @@ impl<'a> Publication<'a> {
                 None => unverified.into(),
             }));
         }
-        self.new = true;
-        if let (Some(surface), Some(extent)) = (surface, extent) {
-            self.whole.add(component, surface, config.patches.padding);
-            self.extents.insert(component, extent);
-        }
         go_on()?;
         observer.stage("pages", component, components);
-        let draw = || match config.pictures.enabled {
+        let is_one_of_few = components <= config.report.max_components;
+        let has_page = config.report.enabled && is_one_of_few;
+        let draw = || match config.pictures.enabled && is_one_of_few {
             true => {
                 let _part = part!("pictures");
                 pictures::write(staging, &subfolder, atlas, config.pictures.size)
             }
             false => Ok(()),
         };
-        let describe = || match config.report.enabled {
+        let describe = || match has_page {
             true => {
                 let _part = part!("page");
                 report_page::write(staging, &subfolder, atlas, &provenance, &config.report)
@@ -160,30 +220,31 @@ impl<'a> Publication<'a> {
         drawn?;
         described?;
         go_on()?;
-        Ok(Ok(()))
+        let shown = surface.zip(extent).map(|(surface, extent)| Shown {
+            surface,
+            padding: config.patches.padding,
+            extent,
+            exhibit: (config.pictures.enabled).then(|| pictures::Exhibit::of(atlas)),
+            cells: atlas.grid.as_ref().map(|grid| grid.cells()),
+            psnr: atlas.quality.image_psnr_db,
+            has_page,
+        });
+        Ok(Ok(shown))
     }
 
-    /// Writes what all components have in common, and puts the folder in place, where any atlas passed.
-    pub fn finish(self) -> Result<(), BuildError> {
-        let Some(staging) = self.staging.filter(|_| self.new) else {
-            return Ok(());
-        };
-        for subfolder in &self.missing {
-            staging.keep_previous(subfolder)?;
+    /// The staging folder, made where there is none.
+    fn staging(&self) -> Result<Arc<Staging>, ExportError> {
+        let mut staging = self.staging.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(staging) = &*staging {
+            return Ok(Arc::clone(staging));
         }
-        if !self.whole.is_empty() {
-            let appearance = &self.asset.soup.appearance;
-            let bytes = self.whole.encode(self.id, FORMAT_VERSION, appearance)?;
-            drop(self.whole);
-            if let Some(bytes) = bytes {
-                staging.write("surface.glb", &bytes)?;
-                drop(bytes);
-                let verdicts = verify_whole(staging.path(), &self.extents);
-                if let Some(unverified) = Unverified::of(&verdicts) {
-                    return Err(unverified.into());
-                }
-            }
-        }
-        Ok(staging.publish()?)
+        let begun = Arc::new(Staging::begin(self.output, self.id)?);
+        Ok(Arc::clone(staging.insert(begun)))
+    }
+
+    /// The staging folder, where anything was written.
+    pub fn finish(self) -> Option<Staging> {
+        let staging = self.staging.into_inner();
+        Arc::into_inner(staging.unwrap_or_else(PoisonError::into_inner)?)
     }
 }

@@ -1,7 +1,7 @@
-//! What each component of a mesh may cost, where there are many.
+//! What each component gets of what is asked for of a mesh.
 //!
-//! *Enters:* components and a configuration. *Leaves:* for each component a configuration whose texels and pixels go with its part of the mesh's
-//! area, so that hundreds of components do not cost hundreds of times what one does.
+//! *Enters:* components and a configuration. *Leaves:* for each component a configuration whose cells, texels and pixels go with its part of the mesh's
+//! area: cells and texels are about as large on all of them, and hundreds of components do not cost hundreds of times what one does.
 
 use crate::config::Config;
 use crate::export::pictures::SIDE_RANGE;
@@ -9,14 +9,13 @@ use crate::geometry::mesh::triangle_area;
 use crate::grid::{GridError, MOST_CELLS};
 use crate::repair::Component;
 
-/// A component with at least this part of the area gets all texels and the pictures that the configuration asks for, a smaller one
-/// proportionally fewer and smaller: all together get at most so many times what one does, but for the floors below.
+/// A component with at least this part of the area gets pictures as large as the configuration asks for, a smaller one smaller.
 const WHOLE: f64 = 1.0 / 16.0;
 
-/// No component gets fewer texels: the least that the configuration may ask for.
-const LEAST_TEXELS: usize = 4096;
+/// No component gets fewer texels, …
+const LEAST_TEXELS: usize = 512;
 
-/// No component gets fewer cells.
+/// … or fewer cells: those of a cube.
 const LEAST_CELLS: usize = 6;
 
 /// No longer side of a picture gets shorter.
@@ -25,7 +24,7 @@ const LEAST_SIDE: usize = 2 * SIDE_RANGE[0];
 /// What each component is of the mesh.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Share {
-    /// The part of what the configuration asks for that it gets, in (0, 1].
+    /// Its part of the mesh's area, in [0, 1].
     part: f64,
     /// Its area, square source units.
     area: f64,
@@ -48,7 +47,7 @@ pub(super) fn shares(components: &[Component]) -> Vec<Share> {
             .area(faces.map(|f| triangle_area(corners(f))).sum())
     };
     let areas: Vec<f64> = components.iter().map(area).collect();
-    let whole = WHOLE * areas.iter().sum::<f64>();
+    let whole: f64 = areas.iter().sum();
     // Areas that float64 does not hold tell nothing.
     let share = |area: f64| Share {
         part: match whole.is_normal() {
@@ -64,16 +63,12 @@ pub(super) fn shares(components: &[Component]) -> Vec<Share> {
 ///
 /// # Errors
 /// A size of cells that asks for too many.
-pub(super) fn of_share(
-    config: &Config,
-    Share { part: share, area }: Share,
-) -> Result<Config, GridError> {
+pub(super) fn of_share(config: &Config, Share { part, area }: Share) -> Result<Config, GridError> {
     let mut config = config.clone();
     let at_least = |whole: usize, part: f64, least: usize| {
         (whole as f64 * part).round().max(least.min(whole) as f64) as usize
     };
-    config.patches.texel_budget =
-        at_least(config.patches.texel_budget, share, LEAST_TEXELS).min(config.patches.texel_budget);
+    config.patches.texel_budget = at_least(config.patches.texel_budget, part, LEAST_TEXELS);
     config.grid.cells = match config.grid.cell_size {
         Some(size) => {
             let cells = area / (size * size);
@@ -88,10 +83,9 @@ pub(super) fn of_share(
             }
             cells.round().max(1.0) as usize
         }
-        None => at_least(config.grid.cells, share, LEAST_CELLS),
+        None => at_least(config.grid.cells, part, LEAST_CELLS),
     };
-    config.pictures.size =
-        at_least(config.pictures.size, share, LEAST_SIDE).min(config.pictures.size);
+    config.pictures.size = at_least(config.pictures.size, (part / WHOLE).min(1.0), LEAST_SIDE);
     Ok(config)
 }
 
@@ -104,21 +98,21 @@ mod tests {
         let mut config = Config::default();
         config.patches.texel_budget = 100_000;
         config.pictures.size = 1000;
+        config.grid.cells = 2000;
         let share = |part| Share { part, area: 1.0 };
         let of = |part: f64| {
             let config = of_share(&config, share(part)).unwrap();
-            (config.patches.texel_budget, config.pictures.size)
+            let texels = config.patches.texel_budget;
+            (texels, config.grid.cells, config.pictures.size)
         };
-        assert_eq!(of(1.0), (100_000, 1000));
-        assert_eq!(of(0.25), (25_000, 250));
-        assert_eq!(of(0.0), (LEAST_TEXELS, LEAST_SIDE));
-        config.patches.texel_budget = 1000;
+        assert_eq!(of(1.0), (100_000, 2000, 1000));
+        assert_eq!(of(0.25), (25_000, 500, 1000));
+        assert_eq!(of(1.0 / 64.0), (1563, 31, 250));
+        assert_eq!(of(0.0), (LEAST_TEXELS, LEAST_CELLS, LEAST_SIDE));
+        config.patches.texel_budget = 400;
         config.pictures.size = 64;
         let small = of_share(&config, share(0.01)).unwrap();
-        assert_eq!(
-            (small.patches.texel_budget, small.pictures.size),
-            (1000, 64)
-        );
+        assert_eq!((small.patches.texel_budget, small.pictures.size), (400, 64));
         // Cells of a size are as many as have the area.
         config.grid.cell_size = Some(0.1);
         let sized = of_share(

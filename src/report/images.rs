@@ -10,6 +10,8 @@ use crate::rebuild::{Images, rebuild};
 /// 400,000 samples give, on five of them within 0.7 dB; where the error sits in few places it is off by more than where it is spread.
 const SAMPLES_OF_FACE: usize = 4;
 const SAMPLES: [usize; 2] = [4_000, 10_000];
+/// But no more than texels, above this number: hundreds of small components are to cost no more than one large one.
+const LEAST_SAMPLES: usize = 500;
 /// Samples for each vertex that is tested: these matter for the largest distance only.
 const SAMPLES_OF_VERTEX: usize = 4;
 
@@ -57,7 +59,9 @@ pub fn measure_images(
         positions: &positions,
         faces: &faces,
     };
-    let samples = (SAMPLES_OF_FACE * source.faces.len()).clamp(SAMPLES[0], SAMPLES[1]);
+    let samples = (SAMPLES_OF_FACE * source.faces.len())
+        .clamp(SAMPLES[0], SAMPLES[1])
+        .min(texels.max(LEAST_SAMPLES));
     let sampling = Sampling {
         samples,
         vertices: samples / SAMPLES_OF_VERTEX,

@@ -3,7 +3,7 @@
 use crate::command::{build, program};
 use serde_json::Value;
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Boxes beside each other, each as a component with a material of its own.
 fn boxes(sides: &[f64]) -> String {
@@ -162,4 +162,69 @@ fn what_failed_is_not_in_it() {
     let listed: Vec<&Value> = listed.iter().map(|entry| &entry["component"]).collect();
     assert_eq!(listed, [0, 2]);
     assert!(verify(&asset).0);
+}
+
+/// All files of a folder with their bytes, by their paths inside it.
+fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut found = Vec::new();
+    let mut open = vec![folder.to_owned()];
+    while let Some(next) = open.pop() {
+        for entry in std::fs::read_dir(next).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            match path.is_dir() {
+                true => open.push(path),
+                false => {
+                    let inside = path.strip_prefix(folder).expect("inside").to_owned();
+                    found.push((inside, std::fs::read(&path).expect("read")));
+                }
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn many_components_have_one_page_and_picture_the_same_for_any_number_of_threads() {
+    let input = tempfile::tempdir().expect("a temporary folder");
+    let mesh = input.path().join("boxes.obj");
+    std::fs::write(&mesh, boxes(&[1.0; 20])).expect("written");
+    let of_threads = |threads: &str| {
+        let pictures = ["pictures.enabled=true", "pictures.size=256"];
+        let built = build(&mesh, &[pictures[0], pictures[1], threads]);
+        assert_eq!(built.code(), Some(0));
+        contents(&built.folder.path().join("boxes"))
+    };
+    let files = of_threads("run.threads=1");
+    let named = |end: &str| {
+        let names = files.iter().map(|(name, _)| name);
+        names.filter(|name| name.ends_with(end)).collect::<Vec<_>>()
+    };
+    assert_eq!(named("atlas.json").len(), 20);
+    assert_eq!(named("report.html"), [Path::new("report.html")]);
+    assert_eq!(named("preview.png"), [Path::new("preview.png")]);
+    let page = files.iter().find(|(name, _)| name.ends_with("report.html"));
+    let page = String::from_utf8_lossy(&page.expect("a page").1).into_owned();
+    assert_eq!(page.matches("href=\"./component-0").count(), 20);
+    assert!(page.contains("more than the 16 of <code>report.max_components</code>"));
+    // Each has a twentieth of the 2,000 cells, and is a box: 6 · 4² of them.
+    assert_eq!(page.matches("data-value=\"96\">96</td>").count(), 20);
+    assert!(files == of_threads("run.threads=3"), "bytes differ");
+}
+
+#[test]
+fn few_components_have_pages_of_their_own_beside_that_of_all() {
+    let built = build(
+        Path::new("fixtures/bad/one-bad-component.obj"),
+        &["pictures.enabled=true"],
+    );
+    let asset = built.folder.path().join("one-bad-component");
+    let page = std::fs::read_to_string(asset.join("report.html")).expect("a page");
+    for part in ["component-000", "component-002"] {
+        assert!(asset.join(part).join("report.html").is_file());
+        assert!(page.contains(&format!("href=\"./{part}/report.html\"")));
+    }
+    assert!(page.contains("of which 1 failed"));
+    assert!(page.contains("<td data-value=\"1\">component-001</td><td colspan=\"10\""));
+    assert!(asset.join("preview.png").is_file());
 }

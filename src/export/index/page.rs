@@ -132,7 +132,7 @@ pub(super) fn angle(radians: f64) -> String {
     format!("{}°", three_digits(radians.to_degrees()))
 }
 
-/// The picture of an asset that was built: that of its first component, if pictures were drawn. The browser fetches it when it comes into view.
+/// The picture of an asset that was built, or of its first component, if pictures were drawn. The browser fetches it when it comes into view.
 fn thumbnail(asset: &Asset<'_>) -> String {
     let record = asset.record;
     if !matches!(record.state, State::Built | State::Cached) {
@@ -140,7 +140,13 @@ fn thumbnail(asset: &Asset<'_>) -> String {
     }
     let ending = format!("/{}", names::PREVIEW);
     let inside = |file: &&String| file.ends_with(&ending) && !file.split('/').any(|p| p == "..");
-    match record.files.iter().find(inside) {
+    let mut pictures = record.files.iter().filter(inside);
+    let own = format!("{}{ending}", record.id);
+    match pictures
+        .clone()
+        .find(|file| **file == own)
+        .or_else(|| pictures.next())
+    {
         Some(file) => format!(
             "<img src=\"{}\" alt=\"\" width=\"64\" height=\"64\" loading=\"lazy\" decoding=\"async\">",
             link(file)
@@ -157,9 +163,14 @@ fn linked(asset: &Asset<'_>) -> String {
     }
     let mut out = format!("<a href=\"{}\">{}</a>", link(&format!("{id}/")), escape(id));
     let ending = format!("/{}", names::REPORT);
-    let reports: Vec<&String> = (asset.record.files.iter())
+    let mut reports: Vec<&String> = (asset.record.files.iter())
         .filter(|file| file.ends_with(&ending))
         .collect();
+    // That of the asset links to those of its components.
+    let own = format!("{id}{ending}");
+    if reports.iter().any(|file| **file == own) {
+        reports.retain(|file| **file == own);
+    }
     for file in reports.iter().take(REPORTS) {
         let words = match component(file) {
             Some(number) => format!("report {number}"),

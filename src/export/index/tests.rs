@@ -186,6 +186,15 @@ fn what_was_built_is_shown_where_pictures_were_drawn() {
     assert_eq!(text.matches("<img").count(), 1, "{text}");
     assert!(text.contains("<img src=\"./a%20b/component-000/preview.png\""));
     assert!(text.contains("loading=\"lazy\""));
+    // The asset's own picture and page come before those of its components.
+    let whole = ["component-000/report.html", "component-000/preview.png"];
+    let whole = [whole, ["preview.png", "report.html"]].concat();
+    manifest.insert(pictured("a b", State::Built, &whole));
+    write(root.path(), &manifest).unwrap();
+    let text = fs::read_to_string(root.path().join(FILE_NAME)).unwrap();
+    assert!(text.contains("<img src=\"./a%20b/preview.png\""));
+    assert!(text.contains("<a href=\"./a%20b/report.html\">report</a>"));
+    assert!(!text.contains("component-000"), "{text}");
 }
 
 #[test]

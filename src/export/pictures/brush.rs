@@ -82,7 +82,7 @@ impl<'a, const N: usize, P: Paint<N>> Brush<'a, N, P> {
     pub fn row(&mut self, row: usize, seen: &[u32], mut lines: [&mut [u8]; N]) {
         let size = self.studio.size;
         let [a, b, c, d] = [0, 1, 2, 3].map(|s: usize| &seen[s * size..][..size]);
-        let faces = self.studio.faces.len() as u32;
+        let faces = self.studio.faces().len() as u32;
         let background = self.studio.light.row(row);
         let mut set = |column: usize, colours: [[u8; 3]; N]| {
             for (line, colour) in lines.iter_mut().zip(colours) {
@@ -173,7 +173,7 @@ impl<'a, const N: usize, P: Paint<N>> Brush<'a, N, P> {
         if object == NOTHING {
             return [studio.light.background(at); N];
         }
-        if let Some(mark) = (object as usize).checked_sub(studio.faces.len()) {
+        if let Some(mark) = (object as usize).checked_sub(studio.faces().len()) {
             let normal = studio.bar_normal(&self.bars[mark], at);
             let (diffuse, gloss) = studio.light.on(normal, at, 1.0, 0.22);
             return [shade(self.bars[mark].colour, diffuse, gloss); N];
@@ -201,7 +201,7 @@ impl<'a, const N: usize, P: Paint<N>> Brush<'a, N, P> {
 impl Studio {
     /// The pictures of the surface in a paint, with marks on it.
     pub fn draw<const N: usize>(&self, marks: &[Mark], paint: &impl Paint<N>) -> [RgbImage; N] {
-        let (size, count) = (self.size, self.faces.len() as u32);
+        let (size, count) = (self.size, self.faces().len() as u32);
         // On the screen, with the radius in pixels.
         let on_screen = |mark: &Mark| Mark {
             ends: mark.ends.map(|p| self.camera.project(p)),

@@ -13,6 +13,10 @@ const CELLS: f64 = 44.0;
 /// Cells may shrink and grow by these powers of two before their size is changed.
 pub const CELL_RANGE: [f64; 2] = [-1.3, 1.7];
 
+/// Colours of cells.
+const LIGHT: Linear = [0.84, 0.80, 0.71];
+const DARK: Linear = [0.070, 0.205, 0.270];
+
 /// The checkerboard: where which cell lies, and how large cells are.
 pub struct Checkerboard<'a> {
     atlas: &'a AffineAtlas,
@@ -69,22 +73,19 @@ impl Checkerboard<'_> {
         let f = FaceId::new(face);
         let [a, b, c] = self.atlas.mesh.connectivity.face_vertices(f);
         let level = |v: VertexId| self.level[v.index()];
-        let mut board = FaceBoard {
-            face: f,
-            level: [level(a), level(b), level(c)],
-            step: 0.0,
-            per_cell: 0.0,
-            at: [[0.0; 3]; 2],
-            ends: [[0.0; 2]; 2],
-        };
+        let mut board = FaceBoard::new(f, [level(a), level(b), level(c)]);
         board.lay(self, 0.0);
         board
     }
 
+    /// Coordinates of the corners of a face in cells.
+    pub fn in_cells(&self, f: FaceId) -> [[f64; 2]; 3] {
+        let cell = self.cell(0.0);
+        self.corners(f, cell).map(|p| p.map(|x| x / cell))
+    }
+
     /// Colour of a spot of the surface, averaged over about a pixel; `board` is that of its face.
     pub fn colour(&self, board: &mut FaceBoard, spot: &Spot) -> Linear {
-        const LIGHT: Linear = [0.84, 0.80, 0.71];
-        const DARK: Linear = [0.070, 0.205, 0.270];
         let (weights, level) = (&spot.weights, &board.level);
         let excess = excess(weights[0] * level[0] + weights[1] * level[1] + weights[2] * level[2]);
         let step = floor(excess);
@@ -150,15 +151,42 @@ pub struct FaceBoard {
 }
 
 impl FaceBoard {
+    fn new(face: FaceId, level: [f64; 3]) -> Self {
+        FaceBoard {
+            face,
+            level,
+            step: 0.0,
+            per_cell: 1.0,
+            at: [[0.0; 3]; 2],
+            ends: [[0.0; 2]; 2],
+        }
+    }
+
+    /// Cells of one size, by the coordinates of the corners in cells.
+    pub fn of_cells(corners: [[f64; 2]; 3]) -> Self {
+        let mut board = Self::new(FaceId::new(0), [0.0; 3]);
+        board.put(corners);
+        board
+    }
+
+    /// Colour of a spot of a face with cells of one size, averaged over about a pixel.
+    pub fn plain(&self, spot: &Spot) -> Linear {
+        let span = [self.span(spot, 0), self.span(spot, 1)];
+        mix(LIGHT, DARK, dark_share(span, self.per_cell) as f32)
+    }
+
     /// Lays cells of another size.
     fn lay(&mut self, board: &Checkerboard, step: f64) {
         let cell = board.cell(step);
-        let [a, b, c] = board.corners(self.face, cell);
+        self.put(board.corners(self.face, cell));
+        (self.step, self.per_cell) = (step, 1.0 / cell);
+    }
+
+    fn put(&mut self, [a, b, c]: [[f64; 2]; 3]) {
         for i in 0..2 {
             self.at[i] = [a[i], b[i] - a[i], c[i] - a[i]];
             self.ends[i] = [a[i].min(b[i]).min(c[i]), a[i].max(b[i]).max(c[i])];
         }
-        (self.step, self.per_cell) = (step, 1.0 / cell);
     }
 
     /// What a pixel around a spot covers of a coordinate; not beyond the face, for cells need not alternate where an island ends.

@@ -2,7 +2,7 @@
 
 use super::colour::{INK, PAPER};
 use super::scale::{Coloured, Range};
-use super::studio::{Mark, Studio};
+use super::studio::{Mark, Shape, Studio};
 use super::text::{self, LINE};
 use crate::geometry::mesh::Mesh;
 use image::{Rgb, RgbImage, imageops};
@@ -41,7 +41,7 @@ impl<'a> Gallery<'a> {
     pub fn new(mesh: &'a Mesh, size: usize) -> Gallery<'a> {
         Gallery {
             side: super::canvas::side(size),
-            studios: Studio::views(mesh, size, mesh.connectivity.is_closed()),
+            studios: Studio::views(Shape::of(mesh), size, mesh.connectivity.is_closed()),
             mesh,
         }
     }

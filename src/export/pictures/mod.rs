@@ -3,6 +3,7 @@
 //! *Enters:* an [`AffineAtlas`], or several metrics on one mesh. *Leaves:* images in memory.
 //!
 //! * [`surface()`]: the surface in space with a checkerboard in flat coordinates, cones and cut; and coloured by the log scale.
+//! * [`Scene`]: all components of an asset.
 //! * [`painted`]: any surface in space in colours of its own.
 //! * [`layout()`]: the central chart and the packed patches in the plane.
 //! * [`convergence()`]: curvature error against flow time (Fig. 7 of the tutorial).
@@ -33,18 +34,20 @@ mod studio;
 mod surface;
 mod text;
 mod view;
+mod whole;
 
 pub use canvas::SIDE_RANGE;
 pub use convergence::convergence;
 pub use gallery::{Gallery, Panel};
 pub use layout::layout;
 pub use surface::{painted, surface};
+pub use whole::{Exhibit, Scene};
 
 use crate::export::ExportError;
 use crate::export::folder::Staging;
 use crate::export::names;
 use crate::product::AffineAtlas;
-use image::{ImageBuffer, ImageEncoder, PixelWithColorType};
+use image::{ImageBuffer, ImageEncoder, PixelWithColorType, RgbImage};
 
 /// Draws all pictures of an atlas into a staging folder; `subfolder` as for
 /// [`write_component`](crate::export::write_component).
@@ -66,13 +69,22 @@ pub fn write(
             "" => name.to_owned(),
             _ => format!("{subfolder}/{name}"),
         };
-        let bytes = encode_png(&picture).map_err(|error| ExportError::Encode {
-            path: staging.target().join(&path),
-            message: error.to_string(),
-        })?;
-        staging.write(&path, &bytes)?;
+        put(staging, &path, &picture)?;
     }
     Ok(())
+}
+
+/// Draws the picture of an asset of several components.
+pub fn write_whole(staging: &Staging, scene: Scene, size: usize) -> Result<(), ExportError> {
+    put(staging, names::PREVIEW, &scene.draw(size))
+}
+
+fn put(staging: &Staging, path: &str, picture: &RgbImage) -> Result<(), ExportError> {
+    let bytes = encode_png(picture).map_err(|error| ExportError::Encode {
+        path: staging.target().join(path),
+        message: error.to_string(),
+    })?;
+    staging.write(path, &bytes)
 }
 
 /// An image as a PNG file in memory.

@@ -18,6 +18,7 @@ use super::view::{Camera, Vec3, along, choose_direction};
 use crate::geometry::mesh::{Mesh, dot, sub};
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Rows of pixels that are drawn at a time.
 pub(super) const BAND: usize = 32;
@@ -56,15 +57,32 @@ impl Mark {
     }
 }
 
+/// What is drawn: one surface, or several.
+#[derive(Default)]
+pub(super) struct Shape {
+    pub positions: Vec<Vec3>,
+    pub faces: Vec<[u32; 3]>,
+    /// Unit normals of the corners of faces.
+    pub normals: Vec<[Vec3; 3]>,
+}
+
+impl Shape {
+    /// Smooth but for creases.
+    pub fn of(mesh: &Mesh) -> Shape {
+        Shape {
+            positions: mesh.positions.as_slice().to_vec(),
+            faces: mesh.connectivity.to_faces(),
+            normals: corner_normals(mesh),
+        }
+    }
+}
+
 /// The surface with its view and light, ready to be painted in several ways.
 pub(super) struct Studio {
     pub camera: Camera,
-    positions: Vec<Vec3>,
-    pub faces: Vec<[u32; 3]>,
+    shape: Arc<Shape>,
     /// Vertices on the screen.
     screen: Vec<Vec3>,
-    /// Unit normals of the corners of faces.
-    normals: Vec<[Vec3; 3]>,
     pub light: Light,
     pub ambient: Ambient,
     /// Faces that may be seen in each band of rows, in ascending order.
@@ -76,34 +94,32 @@ pub(super) struct Studio {
 impl Studio {
     /// Lights the scene for pictures of `size` × `size` pixels, held to the range of sizes: one from where it is seen best, and where
     /// `around` says so one from half around the vertical.
-    pub fn views(mesh: &Mesh, size: usize, around: bool) -> Vec<Studio> {
-        let proxy = Proxy::of(mesh.positions.as_slice(), &mesh.connectivity.to_faces());
+    pub fn views(shape: Shape, size: usize, around: bool) -> Vec<Studio> {
+        let shape = Arc::new(shape);
+        let proxy = Proxy::of(&shape.positions, &shape.faces);
         let [x, y, z] = choose_direction(&proxy.positions, &proxy.faces);
         let directions = [[x, y, z], [-x, y, -z]];
         let views = directions[..if around { 2 } else { 1 }].iter();
         views
-            .map(|&from| Studio::new(mesh, &proxy, size, from))
+            .map(|&from| Studio::new(&shape, &proxy, size, from))
             .collect()
     }
 
     /// From a direction, a unit vector from the scene to the eye.
-    fn new(mesh: &Mesh, proxy: &Proxy, size: usize, direction: Vec3) -> Studio {
+    fn new(shape: &Arc<Shape>, proxy: &Proxy, size: usize, direction: Vec3) -> Studio {
         let size = super::canvas::side(size);
-        let positions = mesh.positions.as_slice().to_vec();
-        let faces = mesh.connectivity.to_faces();
-        let camera = Camera::looking_from(direction, &positions, size as f64);
+        let positions = &shape.positions;
+        let camera = Camera::looking_from(direction, positions, size as f64);
         let screen: Vec<Vec3> = positions.iter().map(|&p| camera.project(p)).collect();
         let floor = Floor::new(&proxy.positions, &proxy.faces);
         let mut studio = Studio {
             size,
-            in_band: in_bands(&faces, &screen, size),
+            in_band: in_bands(&shape.faces, &screen, size),
             screen,
-            normals: corner_normals(mesh),
             light: Light::new(camera.clone(), &floor, size),
             ambient: Ambient::default(),
             camera,
-            positions,
-            faces,
+            shape: Arc::clone(shape),
         };
         studio.ambient = studio.look_around();
         studio
@@ -114,7 +130,7 @@ impl Studio {
         let side = self.size.div_ceil(COARSER);
         let coarser = |p: &Vec3| sparse([p[0] / COARSER as f64, p[1] / COARSER as f64, p[2]]);
         let screen: Vec<Vec3> = self.screen.iter().map(coarser).collect();
-        let band = Band::of(side, 0..side, &self.faces, &screen);
+        let band = Band::of(side, 0..side, self.faces(), &screen);
         let point = |at: usize| {
             let face = band.objects()[at];
             let [x, y] = place(at % side, at / side);
@@ -130,19 +146,28 @@ impl Studio {
         Ambient::new(points, side, picture)
     }
 
+    /// Corners of the faces.
+    pub fn faces(&self) -> &[[u32; 3]] {
+        &self.shape.faces
+    }
+
     /// Corners of a face on the screen.
     pub fn on_screen(&self, face: u32) -> [Vec3; 3] {
-        self.faces[face as usize].map(|v| self.screen[v as usize])
+        self.faces()[face as usize].map(|v| self.screen[v as usize])
     }
 
     /// A face as the picture shows it.
     pub fn aspect(&self, face: u32) -> Aspect {
-        Aspect::new(face, self.on_screen(face), &self.normals[face as usize])
+        Aspect::new(
+            face,
+            self.on_screen(face),
+            &self.shape.normals[face as usize],
+        )
     }
 
     /// The place of a spot in space.
     pub fn position(&self, spot: &Spot) -> Vec3 {
-        let corners = self.faces[spot.face].map(|v| self.positions[v as usize]);
+        let corners = self.faces()[spot.face].map(|v| self.shape.positions[v as usize]);
         std::array::from_fn(|i| (0..3).map(|k| spot.weights[k] * corners[k][i]).sum())
     }
 

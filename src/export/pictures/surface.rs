@@ -5,7 +5,7 @@ use super::brush::Paint;
 use super::checkerboard::{Checkerboard, FaceBoard};
 use super::colour::{CUT, INK, Linear, NEGATIVE, POSITIVE};
 use super::scale::{Coloured, Range};
-use super::studio::{Mark, Studio};
+use super::studio::{Mark, Shape, Studio};
 use super::text;
 use crate::geometry::mesh::Mesh;
 use crate::product::AffineAtlas;
@@ -85,7 +85,7 @@ impl Paint<1> for Painted<'_> {
 }
 
 fn studio(mesh: &Mesh, size: usize) -> Studio {
-    Studio::views(mesh, size, false).swap_remove(0)
+    Studio::views(Shape::of(mesh), size, false).swap_remove(0)
 }
 
 /// Balls at the cones and bars along the cut.

@@ -12,6 +12,7 @@ mod pack;
 mod plots;
 mod surface;
 mod tables;
+pub mod whole;
 
 use crate::export::atlas_json::{self, Document};
 use crate::export::folder::Staging;
@@ -44,6 +45,8 @@ pub struct ReportParams {
     pub enabled: bool,
     /// Most faces of a surface that is drawn on the page.
     pub max_faces: usize,
+    /// Most components of an asset that have pages and pictures of their own, beside those of the asset.
+    pub max_components: usize,
     /// Standard deviation of the log scale above which a build warns of distortion, natural logarithm of length.
     pub distortion_warning: f64,
 }
@@ -54,6 +57,7 @@ impl Default for ReportParams {
         Self {
             enabled: true,
             max_faces: 500_000,
+            max_components: 16,
             distortion_warning: 0.5,
         }
     }

@@ -41,7 +41,7 @@ const FIGURES: &str = "\
 /flags/seamless|Seamless (all gluings are quarter turns)|";
 
 /// A cell with a number.
-fn cell(value: f64) -> String {
+pub(super) fn cell(value: f64) -> String {
     number(value, &figure(value))
 }
 
@@ -49,7 +49,7 @@ fn number(value: f64, words: &str) -> String {
     format!("<td class=\"number\" data-value=\"{value:?}\">{words}</td>")
 }
 
-fn whole(value: usize) -> String {
+pub(super) fn whole(value: usize) -> String {
     format!("<td class=\"number\" data-value=\"{value}\">{value}</td>")
 }
 
@@ -61,7 +61,7 @@ fn vertex_of_file(vertex: Option<u32>) -> String {
 }
 
 /// Rows in a table that scrolls by itself; heads have `|` between them, and those with a `#` stand over numbers.
-fn table(id: &str, label: &str, heads: &str, rows: &str) -> String {
+pub(super) fn table(id: &str, label: &str, heads: &str, rows: &str) -> String {
     let mut out = format!(
         "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{label}\"><table id=\"{id}\" data-sortable><thead><tr>"
     );
@@ -102,7 +102,7 @@ pub(super) fn figures(document: &Value) -> String {
     )
 }
 
-fn row(cells: &[String]) -> String {
+pub(super) fn row(cells: &[String]) -> String {
     format!("<tr>{}</tr>\n", cells.concat())
 }
 

@@ -17,8 +17,9 @@ pub use figures::{Figures, Marked, Scene};
 pub use files::folder_name;
 pub use suggestion::Suggestion;
 
+use super::BuildError;
+use super::components::Observed;
 use super::flatten::{flatten, prescribed};
-use super::{BuildError, Observed};
 use crate::atlas::patch::Domain;
 use crate::config::Config;
 use crate::flow::cones::{

@@ -1,0 +1,105 @@
+//! What all components of an asset have in common.
+//!
+//! *Enters:* published components in their order. *Leaves:* beside their folders, where there are several, one `surface.glb`, one picture and one page of all of them; the folder
+//! replaces the older one in one step.
+
+use super::error::{BuildError, Unverified};
+use super::publication::{Publication, Published};
+use crate::config::Config;
+use crate::export::atlas_json::FORMAT_VERSION;
+use crate::export::glb::whole::Whole;
+use crate::export::pictures::{self, Scene};
+use crate::export::report::whole::{self as page, Row};
+use crate::observe::part;
+use crate::outcome::{ComponentOutcome, Failure};
+use crate::verify::{Extent, verify_whole};
+use std::collections::BTreeMap;
+
+/// See the module docs.
+#[derive(Default)]
+pub(super) struct Assembly {
+    /// Whether any atlas passed.
+    new: bool,
+    /// Subfolders of components that have no atlas.
+    missing: Vec<String>,
+    /// All that passed, where there are several, …
+    whole: Whole,
+    /// … what a file of them is compared with, …
+    extents: BTreeMap<usize, Extent>,
+    /// … what a picture shows …
+    scene: Scene,
+    /// … and what a page says.
+    rows: Vec<Row>,
+}
+
+impl Assembly {
+    /// Notes what became of a component; of several, gives what the manifest says of it.
+    pub fn add(&mut self, published: Published) -> ComponentOutcome {
+        let Published {
+            index,
+            components,
+            result,
+            shown,
+            is_missing,
+            ..
+        } = published;
+        self.new |= result.is_ok();
+        if is_missing {
+            self.missing.push(Publication::subfolder(index, components));
+        }
+        let outcome = ComponentOutcome {
+            index,
+            result: result.map_err(|error| Failure::from(&error)),
+        };
+        if components > 1 {
+            let shown = shown.as_ref();
+            self.rows.push(Row {
+                cells: shown.and_then(|s| s.cells),
+                psnr: shown.and_then(|s| s.psnr),
+                has_page: shown.is_some_and(|s| s.has_page),
+                outcome: outcome.clone(),
+            });
+        }
+        if let Some(shown) = shown {
+            self.whole.add(index, shown.surface, shown.padding);
+            self.extents.insert(index, shown.extent);
+            if let Some(exhibit) = shown.exhibit {
+                self.scene.add(exhibit);
+            }
+        }
+        outcome
+    }
+
+    /// Writes what all have in common, and puts the folder in place, where any atlas passed.
+    pub fn finish(self, publication: Publication<'_>, config: &Config) -> Result<(), BuildError> {
+        let (asset, given, id) = (publication.asset, publication.given, publication.id);
+        let Some(staging) = publication.finish().filter(|_| self.new) else {
+            return Ok(());
+        };
+        for subfolder in &self.missing {
+            staging.keep_previous(subfolder)?;
+        }
+        if !self.whole.is_empty() {
+            let appearance = &asset.soup.appearance;
+            let bytes = self.whole.encode(id, FORMAT_VERSION, appearance)?;
+            drop(self.whole);
+            if let Some(bytes) = bytes {
+                staging.write("surface.glb", &bytes)?;
+                drop(bytes);
+                let verdicts = verify_whole(staging.path(), &self.extents);
+                if let Some(unverified) = Unverified::of(&verdicts) {
+                    return Err(unverified.into());
+                }
+            }
+            if config.pictures.enabled {
+                let _part = part!("pictures");
+                pictures::write_whole(&staging, self.scene, config.pictures.size)?;
+            }
+            if config.report.enabled {
+                let _part = part!("page");
+                page::write(&staging, id, given, config, &self.rows)?;
+            }
+        }
+        Ok(staging.publish()?)
+    }
+}

@@ -1,0 +1,157 @@
+//! The components of a mesh, each from repair to its atlas.
+//!
+//! Small ones are built side by side, large ones, which keep all cores busy by themselves, one after the other; what becomes of them is told in their order.
+
+use super::shares;
+use super::{BuildError, pipeline::pipeline};
+use crate::atlas::patch::Domain;
+use crate::config::Config;
+use crate::flow::cones::{self, Requests};
+use crate::geometry::mesh::Soup;
+use crate::observe::Observer;
+use crate::parallel;
+use crate::product::AffineAtlas;
+use crate::repair::{self, Component};
+
+/// Components of more faces are built alone.
+const SMALL: usize = 10_000;
+
+/// Who watches which component.
+pub(super) struct Observed<'a> {
+    pub observer: &'a dyn Observer,
+    pub component: usize,
+    pub components: usize,
+}
+
+impl Observed<'_> {
+    /// Tells that a stage begins, unless the job was to stop.
+    pub fn enter(&self, stage: &'static str) -> Result<(), BuildError> {
+        if self.observer.cancelled() {
+            return Err(BuildError::Cancelled);
+        }
+        self.observer.stage(stage, self.component, self.components);
+        Ok(())
+    }
+}
+
+/// A component, with what it is asked for.
+pub(super) struct Part<'a> {
+    pub index: usize,
+    /// Of the mesh.
+    pub components: usize,
+    component: Component,
+    requests: Requests,
+    /// With its share of cells, texels and pixels.
+    pub config: Config,
+    /// The same on flat patches.
+    flat: (Requests, Config),
+    observer: &'a dyn Observer,
+}
+
+impl Part<'_> {
+    /// Its atlas, of flat patches where a grid cannot be made.
+    pub fn atlas(&self) -> Result<AffineAtlas, BuildError> {
+        let atlas = self.built(&self.requests, &self.config, None);
+        match atlas {
+            Err(error)
+                if !matches!(error, BuildError::Cancelled)
+                    && self.component.mesh.is_ok()
+                    && self.config.domain() == Domain::Grid =>
+            {
+                self.without_grid(error.to_string())
+            }
+            atlas => atlas,
+        }
+    }
+
+    /// Builds it on other grids, one after the other: with more cells, whose lines leave no slivers where those of fewer did, and without sharp edges as lines.
+    pub fn on_other_grids(&self) -> impl Iterator<Item = Result<AffineAtlas, BuildError>> {
+        let (mut more, mut smooth) = (self.config.clone(), self.config.clone());
+        more.grid.cells = (1.1 * more.grid.cells as f64).round() as usize;
+        smooth.features.angle = 180.0;
+        let configs = [more, smooth].into_iter();
+        configs.map(|config| self.built(&self.requests, &config, None))
+    }
+
+    /// Builds it of flat patches, for this reason.
+    pub fn without_grid(&self, reason: String) -> Result<AffineAtlas, BuildError> {
+        let (requests, config) = &self.flat;
+        self.built(requests, config, Some(reason))
+    }
+
+    fn built(
+        &self,
+        requests: &Requests,
+        config: &Config,
+        no_grid: Option<String>,
+    ) -> Result<AffineAtlas, BuildError> {
+        let component = self.component.clone();
+        let observed = Observed {
+            observer: self.observer,
+            component: self.index,
+            components: self.components,
+        };
+        let enter = |stage| observed.enter(stage);
+        pipeline(component, requests, config, no_grid, self.observer, &enter)
+    }
+
+    fn is_small(&self) -> bool {
+        let mesh = self.component.mesh.as_ref();
+        mesh.map_or(true, |m| m.connectivity.face_count() <= SMALL)
+    }
+}
+
+/// Hands each component to `work`, and what that makes of it to `take`, in order.
+pub(super) fn each<T: Send>(
+    soup: &Soup,
+    config: &Config,
+    observer: &dyn Observer,
+    work: impl Fn(&Part<'_>) -> T + Sync,
+    mut take: impl FnMut(T) -> Result<(), BuildError>,
+) -> Result<(), BuildError> {
+    observer.stage("repair", 0, 1);
+    let repaired = repair::repair(soup, &config.repair)?;
+    let config = config.clone().resolved()?;
+    let config = &Config {
+        images: config.images.held_by(soup),
+        ..config
+    };
+    let assigned = |c: &Config| cones::assign(&repaired, &c.cones, &c.boundary, &c.features);
+    let requests = assigned(config)?;
+    let otherwise = assigned(&config.on_flat_patches())?;
+    let shares = shares::shares(&repaired.components);
+    let components = repaired.components.len();
+    let wanted = requests.into_iter().zip(otherwise).zip(shares);
+    let each = repaired.components.into_iter().zip(wanted).enumerate();
+    let parts = each.map(|(index, (component, ((requests, otherwise), share)))| {
+        let config = shares::of_share(config, share)?;
+        Ok(Part {
+            index,
+            components,
+            component,
+            requests,
+            flat: (otherwise, config.on_flat_patches()),
+            config,
+            observer,
+        })
+    });
+    let parts: Vec<Part<'_>> = parts.collect::<Result<_, BuildError>>()?;
+    let worked = |part: Part<'_>| {
+        let made = work(&part);
+        observer.finished(part.index, components);
+        made
+    };
+    let mut small = Vec::new();
+    for part in parts {
+        match part.is_small() {
+            true => small.push(part),
+            false => {
+                let before = parallel::beside(std::mem::take(&mut small), &worked);
+                before.into_iter().try_for_each(&mut take)?;
+                take(worked(part))?;
+            }
+        }
+    }
+    let others = parallel::beside(small, &worked);
+    others.into_iter().try_for_each(take)
+}
