@@ -146,12 +146,12 @@ pub(super) fn each<T: Send>(
         match part.is_small() {
             true => small.push(part),
             false => {
-                let before = parallel::beside(std::mem::take(&mut small), &worked);
+                let before = parallel::beside(std::mem::take(&mut small), worked);
                 before.into_iter().try_for_each(&mut take)?;
                 take(worked(part))?;
             }
         }
     }
-    let others = parallel::beside(small, &worked);
+    let others = parallel::beside(small, worked);
     others.into_iter().try_for_each(take)
 }

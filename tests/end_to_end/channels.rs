@@ -469,7 +469,7 @@ fn near(t: &[P3; 3], p: P3) -> Option<[f64; 3]> {
     (is_near && weights.iter().all(|x| *x > -1e-3)).then_some(weights)
 }
 
-/// Corners of quads have the texture coordinates of a face of the file that they lie in, and quads inside one material have it.
+/// Corners of quads have the texture coordinates of a face of the file that they lie in, and quads inside one face have its material.
 #[test]
 fn the_quad_mesh_has_materials_and_texture_coordinates() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -489,16 +489,17 @@ fn the_quad_mesh_has_materials_and_texture_coordinates() {
             "usemtl" => material = rest.to_owned(),
             _ => {
                 *names.entry(material.clone()).or_insert(0) += 1;
-                let mut materials: Vec<u32> = Vec::new();
+                let mut around: Vec<Vec<usize>> = Vec::new();
                 for corner in rest.split(' ') {
                     let (v, t) = corner.split_once('/').expect("texture coordinates");
                     let [v, t] = [v, t].map(|x| x.parse::<usize>().expect("a row") - 1);
                     let mut best = f64::INFINITY;
+                    around.push(Vec::new());
                     for (f, t3) in source.position.iter().enumerate() {
                         let Some(weights) = near(t3, points[v]) else {
                             continue;
                         };
-                        materials.push(source.material[f]);
+                        around.last_mut().expect("a corner").push(f);
                         let of = |i: usize| -> f64 {
                             (0..3).map(|k| weights[k] * source.texcoord[f][k][i]).sum()
                         };
@@ -508,9 +509,9 @@ fn the_quad_mesh_has_materials_and_texture_coordinates() {
                     assert!(best < 0.01, "{line}: {best}");
                     corners_seen += 1;
                 }
-                let first = materials[0];
-                if materials.iter().all(|m| *m == first) {
-                    let name = match first {
+                let face = around[0][0];
+                if around.iter().all(|faces| *faces == [face]) {
+                    let name = match source.material[face] {
                         NONE => "none".to_owned(),
                         m => format!("paint{}", m + 1),
                     };
