@@ -15,7 +15,7 @@ use std::path::PathBuf;
 /// Fewest edges of a chain that counts where nobody named them: shorter ones are mostly noise, …
 pub const LEAST_EDGES: usize = 5;
 /// … unless they are as long as this, in square roots of the surface's area, and meet others at quarter turns: edges of a box.
-pub const LONG: f64 = 0.05;
+pub const LONG: f64 = 0.1;
 /// How far from a multiple of a quarter turn, radians, the surface may turn between such a chain and the next sharp edge.
 const OFF_QUARTER: f64 = 20.0 / 180.0 * PI;
 /// And its least length, in square roots of the surface's area: about a side of the cells when there are 2,000. What is shorter has no place in a grid, however

@@ -182,17 +182,20 @@ fn made(
         turns,
         cones,
     };
-    let cells = params.cells as f64;
-    let mut grids =
-        TARGETS.map(|part| move |s: &Flattened| of_cells(s, params, part * cells, gutter));
-    let [first, others @ ..] = &mut grids;
-    first(&surface).or_else(|error| match error {
-        GridError::TurnedOver { .. } | GridError::Lost { .. } => {
-            let another = others.iter_mut().find_map(|grid| grid(&surface).ok());
-            another.ok_or(error)
-        }
-        _ => Err(error),
-    })
+    let energy = std::cell::Cell::new(0.0);
+    let of_part = |part: f64| {
+        let cells = part * params.cells as f64;
+        of_cells(&surface, params, cells, gutter, &energy)
+    };
+    let error = match of_part(1.0) {
+        Err(e @ (GridError::TurnedOver { .. } | GridError::Lost { .. })) => e,
+        made => return made,
+    };
+    let another = |&part: &f64| of_part(part).ok();
+    match energy.get() < MOST_ENERGY {
+        true => TARGETS.iter().find_map(another).ok_or(error),
+        false => Err(error),
+    }
 }
 
 /// A surface on the plane and its cones.
@@ -204,15 +207,19 @@ struct Flattened<'a> {
     cones: cone_triangulation::ConeTriangulation,
 }
 
-/// Parts of the number of cells that are asked for in turn, as long as faces are turned over or lines are lost: other whole numbers leave them other room.
-const TARGETS: [f64; 5] = [1.0, 1.05, 0.95, 1.1, 0.9];
+/// Parts of the number of cells that are asked for in turn, where faces are turned over or lines are lost: other whole numbers leave them other room.
+const TARGETS: [f64; 3] = [1.05, 0.95, 1.1];
 
-/// The grid of about so many cells.
+/// Mean of ‖J‖² + ‖J⁻¹‖² from which on a surface is noise, whose grids take long and are no better a second time.
+pub(crate) const MOST_ENERGY: f64 = 100.0;
+
+/// The grid of about so many cells. `energy` becomes the mean of ‖J‖² + ‖J⁻¹‖² as soon as it is known.
 fn of_cells(
     surface: &Flattened,
     params: &GridParams,
     wanted: f64,
     gutter: usize,
+    energy: &std::cell::Cell<f64>,
 ) -> Result<(GridMap, Grid, layout::Located), GridError> {
     let Flattened { mesh, cones, .. } = surface;
     let c = &mesh.connectivity;
@@ -265,6 +272,7 @@ fn of_cells(
     let unit = Units::new(mesh, cell_size, params.density)?;
     drop(part);
     let relaxed = relax::relax(&mut map, &unit)?;
+    energy.set(relaxed.energy[1]);
     let unfolded = cells::unfold(&mut map, &quads, &unit)?;
     tracing::debug!(
         cones = cones.vertex.len(),

@@ -10,6 +10,7 @@ use super::warnings::warnings;
 use crate::config::Config;
 use crate::export::folder::{Staging, component_name};
 use crate::export::{self, ExportError, Provenance, glb, pictures, report as report_page};
+use crate::grid::{Grid, MOST_ENERGY};
 use crate::observe::{Observer, part};
 use crate::outcome::Summary;
 use crate::product::AffineAtlas;
@@ -115,10 +116,12 @@ impl<'a> Publication<'a> {
         let mut added = self.add(index, components, &mut atlas, config)?;
         if let (Err(error), true) = (&added, atlas.grid.is_some()) {
             let reason = error.to_string();
-            for other in part
-                .on_other_grids()
-                .chain(std::iter::once_with(|| part.without_grid(reason)))
-            {
+            let mean = |g: &Grid| g.distortion.symmetric_dirichlet.mean;
+            let is_noise = atlas.grid.as_ref().map(mean) > Some(MOST_ENERGY);
+            let tries = if is_noise { 0 } else { usize::MAX };
+            let grids = part.on_other_grids().take(tries);
+            let flat = std::iter::once_with(|| part.without_grid(reason));
+            for other in grids.chain(flat) {
                 match other {
                     Err(BuildError::Cancelled) => return Err(BuildError::Cancelled),
                     Err(error) => added = Err(error),
