@@ -33,7 +33,7 @@ pub(super) struct Assembly {
 }
 
 impl Assembly {
-    /// Notes what became of a component; of several, gives what the manifest says of it.
+    /// Notes what became of a component, and gives what the manifest says of it.
     pub fn add(&mut self, published: Published) -> ComponentOutcome {
         let Published {
             index,

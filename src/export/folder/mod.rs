@@ -221,6 +221,8 @@ impl Staging {
     /// the component is the whole asset (no subfolder), there is nothing left to publish.
     pub fn withdraw(&self, subfolder: &str) -> Result<bool, ExportError> {
         if subfolder.is_empty() {
+            let emptied = fs::remove_dir_all(&self.path).and_then(|()| fs::create_dir(&self.path));
+            emptied.map_err(ExportError::io(Action::Write, &self.path))?;
             return Ok(false);
         }
         let path = self.inside(subfolder)?;

@@ -254,3 +254,17 @@ fn one_kind_of_folder_never_replaces_another() {
     let refused = begin(Contents::Cones, "spot").map(|_| ());
     assert!(matches!(refused, Err(ExportError::ForeignFolder { .. })));
 }
+
+#[test]
+fn a_withdrawn_asset_of_one_component_leaves_no_file_behind() {
+    let (root, registry) = (tempfile::tempdir().unwrap(), registry());
+    let staging = Staging::begin_in(registry, Contents::Atlas, root.path(), "spot").unwrap();
+    staging.write("atlas.json", b"grid").unwrap();
+    staging.write("images/0000.exr", b"of a block").unwrap();
+    assert!(!staging.withdraw("").unwrap());
+    staging.write("atlas.json", b"flat").unwrap();
+    staging.publish().unwrap();
+    let out = root.path().join("spot");
+    assert_eq!(list_files(&out).unwrap(), ["atlas.json"]);
+    assert_eq!(fs::read(out.join("atlas.json")).unwrap(), b"flat");
+}
