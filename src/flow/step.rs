@@ -1,4 +1,8 @@
-//! What the flow records of each of its steps.
+//! What the flow records of each of its steps, and where it ends.
+
+/// Where no step lowers the error any more, rounding is the limit, and an error up to this is accepted, radians: the achieved
+/// one is in the record and in the report.
+pub(super) const FLOAT64_FLOOR: f64 = 1e-9;
 
 /// One line of the convergence record.
 #[derive(

@@ -16,9 +16,10 @@ use std::collections::hash_map::Entry;
 use std::collections::{BTreeSet, HashMap};
 
 /// A triangle is *collinear* where its two short sides together are not longer than its long side by more
-/// than this fraction: within the rounding of the three lengths, so that no metric that keeps them
-/// has a triangle inequality left. The thinnest face of the models tried has 3e-6.
-const COLLINEAR_EXCESS: f64 = 8.0 * f64::EPSILON;
+/// than this fraction. The corner between them is then at most 7e-7 of the long side away from it: that much
+/// the rounding of float32 coordinates moves points of a line, as Boolean operations leave them. The normal
+/// of such a face is rounding too.
+const COLLINEAR_EXCESS: f64 = 1e-12;
 
 /// A face on its way to the surface.
 #[derive(Clone, Debug, PartialEq)]

@@ -21,7 +21,7 @@ use super::problem::{Problem, Solution};
 use crate::flow::laplacian::System;
 use crate::flow::metric::Evaluation;
 use crate::flow::scale::{dot, moved, spread};
-use crate::flow::step::FlowStep;
+use crate::flow::step::{FLOAT64_FLOOR, FlowStep};
 use crate::geometry::ids::VertexVec;
 
 /// Largest change of `u` tried in one step: e^20 in scale. Beyond it the quadratic model means nothing.
@@ -38,9 +38,6 @@ const SMALLEST_STEP: f64 = 1e-10;
 const SETTLED: f64 = 1e-13;
 /// Largest number of steps after the tolerance is met.
 const POLISHING_STEPS: usize = 8;
-/// Where no step lowers the error any more, rounding is the limit, and an error up to this is accepted, radians: the achieved
-/// one is in the record and in the report.
-pub(super) const FLOAT64_FLOOR: f64 = 1e-9;
 /// Largest difference in what a step would still add to `u` at the end. A packing that (6) rules out by equality has curvatures
 /// that reach the target only as `u` runs away, one unit a Newton step, until rounding takes it for converged.
 const REMAINING_CHANGE: f64 = 0.1;

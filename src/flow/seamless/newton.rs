@@ -4,12 +4,14 @@
 //! would refuse the long way down, the second alone halves every step near the end, where rounding decides the sign.
 //!
 //! Where a full step leaves a tenth of the error, its factor serves for further steps as long as each leaves a tenth again: they cost a fraction of
-//! one with a factor of its own. The same after the tolerance is met, as long as each halves the error.
+//! one with a factor of its own. The same after the tolerance is met, as long as each halves the error. Where no step does that before it is met, and the error is
+//! what rounding makes of the angles of thin faces, that is the end as well.
 
 use super::norm::Norm;
 use super::normal::Normal;
 use super::state::{Problem, State};
 use super::{SeamlessError, SeamlessParams, SeamlessStep};
+use crate::flow::step::FLOAT64_FLOOR;
 use crate::geometry::ids::EdgeVec;
 use crate::observe::Observer;
 
@@ -79,8 +81,15 @@ pub(super) fn solve(
         }
         let mut normal = Normal::new(problem, &state, norm, last.take())?;
         let (direction, change) = normal.direction(problem, norm, &state.missing);
-        let Some((next, found, step)) = line_search(problem, &penner, &state, &direction, &change)
-        else {
+        let is_near = state.max_error <= FLOAT64_FLOOR;
+        let taken =
+            line_search(problem, &penner, &state, &direction, &change).filter(|(_, found, _)| {
+                !is_near || found.max_error <= POLISHING_SHARE * state.max_error
+            });
+        let Some((next, found, step)) = taken else {
+            if is_near {
+                break;
+            }
             return Err(stalled(record.iteration, &state, 0.0));
         };
         let is_fast = step == 1.0 && found.max_error <= FAST_SHARE * state.max_error;
