@@ -13,6 +13,9 @@ use crate::geometry::connectivity::{Connectivity, Flip};
 use crate::geometry::ids::{EdgeId, FaceId, FaceVec, HalfedgeId};
 use std::collections::VecDeque;
 
+/// Least double area of a face that a flip may make, by the square of the longer diagonal: corners on one line have one that is rounding.
+const FLAT: f64 = 1e-10;
+
 /// A flip that keeps the metric, and how the new length depends on the old ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EuclidFlip {
@@ -278,7 +281,11 @@ fn area([p, q, r]: [[f64; 2]; 3]) -> f64 {
 fn derivatives([a, b, c, d]: [[f64; 2]; 4]) -> Option<[f64; 5]> {
     let (abc, abd) = (area([a, b, c]), area([a, b, d]));
     let (dca, dcb) = (area([d, c, a]), area([d, c, b]));
-    let is_convex = abc > 0.0 && abd < 0.0 && dca > 0.0 && dcb < 0.0;
+    let size = [distance(a, b), distance(c, d)]
+        .into_iter()
+        .fold(0.0, f64::max);
+    let least = FLAT * size * size;
+    let is_convex = abc > 0.0 && abd < 0.0 && dca > least && dcb < -least;
     if !is_convex {
         return None;
     }
@@ -335,5 +342,8 @@ mod tests {
             );
         }
         assert_eq!(derivatives([a, b, c, [3.0, 0.2]]), None);
+        // The corners a, c and d on one line but for rounding: the flip would make a face of them.
+        let on_line = [[0.0, 1e-13], [2.0, 0.1], [0.5, 1.0], [-0.5, -1.0]];
+        assert_eq!(derivatives(on_line), None);
     }
 }

@@ -10,7 +10,9 @@ use super::lattice::{Lattice, UNIT};
 use super::quads::QuadMesh;
 use super::sheet::{Aim, Sheet};
 use super::triangle::double_area;
-use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId, HalfedgeVec, NONE, VertexId, VertexVec};
+use crate::geometry::ids::{
+    EdgeVec, FaceId, FaceVec, HalfedgeId, HalfedgeVec, NONE, VertexId, VertexVec,
+};
 use crate::geometry::subdivision::Subdivision;
 use std::collections::VecDeque;
 use std::f64::consts::FRAC_PI_2;
@@ -231,21 +233,29 @@ struct Under {
     shift: [f64; 2],
 }
 
-/// Refines a surface along the sides of the cone triangulation and maps it; see the module docs. `vertex`: the vertices of the lattice as vertices of the surface; `turns` those between the frames of its faces.
+/// Refines a surface along the sides of the cone triangulation and maps it; see the module docs. `vertex`: the vertices of the lattice as vertices of the surface; `turns` those between the frames of its faces; `is_line` its edges on lines but borders.
 pub(crate) fn affine(
     fine: Subdivision,
     turns: HalfedgeVec<u8>,
     lattice: &Lattice,
     vertex: &VertexVec<VertexId>,
     mesh: &QuadMesh,
+    is_line: &EdgeVec<bool>,
     may_move: impl Fn(VertexId) -> bool + Copy,
 ) -> Result<GridMap, GridError> {
     let complex = &lattice.complex;
     let mut sheet = Sheet::new(fine, turns, NEAR);
-    for h in complex.sides() {
-        if complex.side(h).twin.is_some_and(|t| t < h) {
-            continue;
-        }
+    let own = |&h: &HalfedgeId| complex.side(h).twin.is_none_or(|t| h < t);
+    let (lines, others): (Vec<HalfedgeId>, Vec<HalfedgeId>) = complex
+        .sides()
+        .filter(own)
+        .partition(|&h| complex.side(h).is_line);
+    // Lines are edges already; what is drawn after them cannot cross them.
+    for h in lines {
+        let (side, goal) = (complex.side(h), vertex[complex.head(h)]);
+        sheet.follow(vertex[side.tail], side.bearing, h.raw(), goal, is_line)?;
+    }
+    for h in others {
         let aim = aim(&sheet, lattice, vertex, h)?;
         let aims = sheet.near(aim);
         sheet.draw(aims, h.raw(), Some(vertex[complex.head(h)]), may_move)?;

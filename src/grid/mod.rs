@@ -13,6 +13,7 @@ mod dirichlet;
 mod distortion;
 mod energy;
 mod error;
+mod follow;
 pub mod islands;
 pub mod lattice;
 mod layout;
@@ -264,6 +265,7 @@ fn of_cells(
         &lattice,
         &cones.vertex,
         &quads,
+        surface.lines,
         may_move,
     )?;
     slivers::thicken(&mut map);

@@ -315,6 +315,61 @@ fn a_collinear_face_goes_and_the_surface_stays_closed() {
 }
 
 #[test]
+fn what_float32_rounds_twice_is_one_point() {
+    // Two neighbours in the middle of the bottom, so near that all faces at their edge are needles, or not quite.
+    for (apart, welded) in [(1e-7, 1), (1e-4, 0)] {
+        let mut cube = cube(4);
+        let at = |p: [f64; 3]| cube.positions.iter().position(|&q| q == p).unwrap();
+        let (v, w) = (at([2.0, 2.0, 0.0]), at([2.0, 3.0, 0.0]));
+        cube.positions[v] = [2.0, 3.0 - apart, 0.0];
+        let result = repaired(&cube);
+        assert_eq!(chi(only(&result)), 2);
+        assert_eq!(count(&result, "welded_vertices"), welded);
+        assert_eq!(count(&result, "removed_degenerate_faces"), 2 * welded);
+        assert_eq!(
+            result.locate(v as u32) == result.locate(w as u32),
+            welded == 1
+        );
+    }
+    // A short edge with one face that is no needle stays, and so does a chain that is long in all.
+    let positions: Vec<[f64; 3]> = (0..=3)
+        .map(|i| [1.5e-6 * f64::from(i), 0.0, 0.0])
+        .chain([[0.0, 1.0, 0.0], [2e-6, -2e-6, 0.0]])
+        .collect();
+    let fan: Vec<[u32; 3]> = (0..3).map(|i| [i, i + 1, 4]).collect();
+    let soup_of_fan = soup(positions.clone(), fan.clone());
+    let welded = count(
+        &repair(&soup_of_fan, &RepairParams::default()).unwrap(),
+        "welded_vertices",
+    );
+    assert_eq!(welded, 2);
+    let below = soup(
+        positions,
+        [fan, vec![[1, 0, 5], [2, 1, 5], [3, 2, 5]]].concat(),
+    );
+    assert_eq!(count(&repaired(&below), "welded_vertices"), 0);
+}
+
+#[test]
+fn a_corner_that_float32_rounds_off_its_line_is_on_it() {
+    for (aside, removed) in [(5e-7, 1), (1e-4, 0)] {
+        let mut cube = cube(4);
+        let at = |p: [f64; 3]| cube.positions.iter().position(|&q| q == p).unwrap();
+        let v = at([2.0, 2.0, 0.0]);
+        let face = *cube.faces.iter().find(|f| f.contains(&(v as u32))).unwrap();
+        let others: Vec<u32> = face.into_iter().filter(|&w| w as usize != v).collect();
+        let [p, q] = [others[0], others[1]].map(|w| cube.positions[w as usize]);
+        let own = cube.positions[v];
+        cube.positions[v] =
+            std::array::from_fn(|i| (1.0 - aside) * (0.25 * p[i] + 0.75 * q[i]) + aside * own[i]);
+        let result = repaired(&cube);
+        assert_eq!(chi(only(&result)), 2);
+        assert!((area(only(&result)) - 6.0 * 16.0).abs() < 1e-12);
+        assert_eq!(count(&result, "removed_collinear_faces"), removed);
+    }
+}
+
+#[test]
 fn attributes_are_interpolated_where_a_face_is_split_and_reversed_where_it_is_flipped() {
     // Vertex 4 lies on the diagonal of a square; face 1 has no area; face 2 runs the wrong way.
     let positions = vec![

@@ -4,12 +4,17 @@
 //! on its own. Joining all vertices at equal positions would mend both, but would also join closed
 //! sheets that only touch. So a vertex is welded only where it lies on an open edge (an edge of one
 //! face) of the file's own connectivity: a vertex whose fans are all complete lacks nothing. Ends of one edge
-//! at one position are joined in any case, since no metric has an edge of length zero.
+//! at one position are joined in any case, since no metric has an edge of length zero; so are those of an edge
+//! that is nothing beside the others of all its faces, as Boolean operations and marching cubes leave them where
+//! float32 rounds the same point twice.
 
 use crate::geometry::mesh::{bounding_box, distance};
 use crate::repair::RepairParams;
 use crate::repair::log::Change;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
+
+/// An edge that is shorter than this part of the longest edge of each of its faces is one point: a few units in the last place of float32 coordinates.
+const NEEDLE: f64 = 2e-6;
 
 /// For every vertex the one that stands for it (itself, or a lower index at the same position). `faces` are those of the file;
 /// adds a change for each that is gone and for each that no face uses.
@@ -38,6 +43,7 @@ pub fn weld(
             }
         }
     }
+    join_needles(positions, faces, &mut stands_for);
     let mut used = vec![false; positions.len()];
     for &v in faces.iter().flatten() {
         used[v as usize] = true;
@@ -121,6 +127,48 @@ fn weld_within(
         match near {
             Some(s) => stands_for[v] = s,
             None => survivors.entry(home).or_default().push(v as u32),
+        }
+    }
+}
+
+/// Joins the ends of edges whose faces are all needles, shortest first; not transitively.
+fn join_needles(positions: &[[f64; 3]], faces: &[[u32; 3]], stands_for: &mut [u32]) {
+    let at = |v: u32| positions[v as usize];
+    let corners = |face: &[u32; 3], stands_for: &mut [u32]| face.map(|v| root(stands_for, v));
+    let lengths = |f: [u32; 3]| [0, 1, 2].map(|k| distance(at(f[k]), at(f[(k + 1) % 3])));
+    let longest = |lengths: [f64; 3]| lengths.into_iter().fold(0.0, f64::max);
+    // Length of the edge and longest one of its faces.
+    let mut needles: BTreeMap<[u32; 2], [f64; 2]> = BTreeMap::new();
+    for is_last in [false, true] {
+        for face in faces {
+            let f = corners(face, stands_for);
+            let lengths = lengths(f);
+            let longest = longest(lengths);
+            for (k, &length) in lengths.iter().enumerate() {
+                let [a, b] = [f[k], f[(k + 1) % 3]];
+                let (edge, is_needle) = ([a.min(b), a.max(b)], length <= NEEDLE * longest);
+                match (is_last, is_needle) {
+                    (false, true) if a != b => {
+                        let shortest = needles.entry(edge).or_insert([length, longest]);
+                        shortest[1] = shortest[1].min(longest);
+                    }
+                    (true, false) => {
+                        needles.remove(&edge);
+                    }
+                    _ => {}
+                }
+            }
+        }
+        if needles.is_empty() {
+            return;
+        }
+    }
+    let mut needles: Vec<([u32; 2], [f64; 2])> = needles.into_iter().collect();
+    needles.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
+    for ([a, b], [_, longest]) in needles {
+        let [p, q] = [a, b].map(|v| at(root(stands_for, v)));
+        if distance(p, q) <= NEEDLE * longest {
+            join(stands_for, a, b);
         }
     }
 }

@@ -94,6 +94,20 @@ fn sharp_edges_of_a_part_are_lines() {
     assert!(free.share() < 0.5, "{:.3}: {free:?}", free.share());
 }
 
+/// Vertices on straight edges make flips of faces without area possible, which were taken once: then no edge was a line.
+#[test]
+fn edges_of_a_chair_are_lines() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mesh = folder.path().join("chair.obj");
+    std::fs::write(&mesh, include_str!("features/chair.obj")).expect("writable");
+    let built = build_small(&mesh, &[]);
+    assert_eq!(built.code(), Some(0), "{}", built.message());
+    let atlas = built.atlas();
+    verify(&atlas);
+    let found = lines(&atlas);
+    assert!(found.chains >= 28 && found.share() == 1.0, "{found:?}");
+}
+
 /// Edges that a file names are lines, however smooth and few, and others are not.
 #[test]
 fn edges_of_a_file_are_lines() {

@@ -92,6 +92,7 @@ pub(super) fn flow(
                 if held.is_empty() {
                     return Err(error);
                 }
+                tracing::debug!(%error, lines = held.len(), "with fewer features");
                 let of_side = |edge: EdgeId| {
                     let side = glued.iter().position(|&e| e == edge)?;
                     owner.get(side / 2).copied()
