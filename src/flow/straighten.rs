@@ -13,8 +13,8 @@ use crate::geometry::connectivity::{Connectivity, Flip};
 use crate::geometry::ids::{EdgeId, FaceId, FaceVec, HalfedgeId};
 use std::collections::VecDeque;
 
-/// Least double area of a face that a flip may make, by the square of the longer diagonal: corners on one line have one that is rounding.
-const FLAT: f64 = 1e-10;
+/// Double area of a face, by the square of the longer diagonal, below which a flip that makes it waits for others: corners on one line have one that is rounding.
+const FLAT: f64 = 1e-12;
 
 /// A flip that keeps the metric, and how the new length depends on the old ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -202,18 +202,25 @@ impl Strip {
 
     /// Flips until no edge crosses the line; the edge that the line has become.
     fn clear(&mut self, flat: &mut Delaunay, flips: &mut Vec<EuclidFlip>) -> Option<EdgeId> {
-        let mut left_over = 4 * self.crossed.len() * self.crossed.len() + 4;
-        let mut line = None;
+        let mut left_over = 8 * self.crossed.len() * self.crossed.len() + 8;
+        let (mut line, mut refused) = (None, 0);
         while let Some((edge, corners)) = self.crossed.pop_front() {
             left_over = left_over.checked_sub(1)?;
             let [a, b] = corners;
             let (above, below) = self.beside(a, b)?;
             let [c, d] = [above.1, below.1];
             let quad = [a, b, c, d].map(|at| self.place[at]);
-            let Some(by) = derivatives(quad) else {
+            let least = if refused > self.crossed.len() {
+                0.0
+            } else {
+                FLAT
+            };
+            let Some(by) = derivatives(quad, least) else {
                 self.crossed.push_back((edge, corners));
+                refused += 1;
                 continue;
             };
+            refused = 0;
             let length = distance(quad[2], quad[3]).ln() + self.log_unit;
             let flip = flat.flip_to(edge, length)?;
             let k = &flat.connectivity;
@@ -275,16 +282,16 @@ fn area([p, q, r]: [[f64; 2]; 3]) -> f64 {
     (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
 }
 
-/// ∂ ln l_dc / ∂ ln l of ab, ca, ad, db, bc for c on the left of ab and d on the right; `None` where the quad is not strictly convex.
+/// ∂ ln l_dc / ∂ ln l of ab, ca, ad, db, bc for c on the left of ab and d on the right; `None` where the quad is not strictly convex, or a face of the other diagonal smaller than `least`.
 ///
 /// The six distances of four points in the plane keep Σ ω_ij l_ij dl_ij = 0 with ω_ij = 1 / (A_ijk A_ijl), A the signed areas.
-fn derivatives([a, b, c, d]: [[f64; 2]; 4]) -> Option<[f64; 5]> {
+fn derivatives([a, b, c, d]: [[f64; 2]; 4], least: f64) -> Option<[f64; 5]> {
     let (abc, abd) = (area([a, b, c]), area([a, b, d]));
     let (dca, dcb) = (area([d, c, a]), area([d, c, b]));
     let size = [distance(a, b), distance(c, d)]
         .into_iter()
         .fold(0.0, f64::max);
-    let least = FLAT * size * size;
+    let least = least * size * size;
     let is_convex = abc > 0.0 && abd < 0.0 && dca > least && dcb < -least;
     if !is_convex {
         return None;
@@ -326,7 +333,7 @@ mod tests {
             let d = apex([ends[1], ends[0]], [ab, ad], db).unwrap();
             distance(c, d).ln()
         };
-        let by = derivatives(quad).unwrap();
+        let by = derivatives(quad, FLAT).unwrap();
         for k in 0..5 {
             let h = 1e-6;
             let at = |h: f64| {
@@ -341,9 +348,10 @@ mod tests {
                 by[k]
             );
         }
-        assert_eq!(derivatives([a, b, c, [3.0, 0.2]]), None);
+        assert_eq!(derivatives([a, b, c, [3.0, 0.2]], 0.0), None);
         // The corners a, c and d on one line but for rounding: the flip would make a face of them.
         let on_line = [[0.0, 1e-13], [2.0, 0.1], [0.5, 1.0], [-0.5, -1.0]];
-        assert_eq!(derivatives(on_line), None);
+        assert_eq!(derivatives(on_line, FLAT), None);
+        assert!(derivatives(on_line, 0.0).is_some());
     }
 }

@@ -104,8 +104,11 @@ fn edges_of_a_chair_are_lines() {
     assert_eq!(built.code(), Some(0), "{}", built.message());
     let atlas = built.atlas();
     verify(&atlas);
-    let found = lines(&atlas);
-    assert!(found.chains >= 28 && found.share() == 1.0, "{found:?}");
+    let document = document(&atlas);
+    let features = document["features"].as_array().expect("features");
+    assert_eq!(features.len(), 28);
+    let is_line = |f: &&serde_json::Value| f["is_line"] == true;
+    assert_eq!(features.iter().filter(is_line).count(), 28);
 }
 
 /// Edges that a file names are lines, however smooth and few, and others are not.

@@ -11,7 +11,7 @@ use crate::flow::solve::SymmetricSolver;
 use crate::geometry::ids::{EdgeId, EdgeVec, NONE, VertexId};
 use crate::observe::part;
 
-/// Shifts of the diagonal, parts of each entry, tried in turn until the matrix is positive definite. Rows of needles are many powers of ten larger than others.
+/// Shifts of the diagonal, relative to its mean, tried in turn until the matrix is positive definite.
 const SHIFTS: [f64; 4] = [1e-14, 1e-12, 1e-10, 1e-8];
 
 /// The system at one λ.
@@ -51,7 +51,7 @@ impl Normal {
         let Products {
             pairs,
             values,
-            diagonal,
+            mut diagonal,
         } = Products::new(equations, &parts);
         let loops = equations - problem.local_equations();
         // An order that is kept although edges were flipped lets the factor fill up: twice over for one edge in a hundred.
@@ -60,10 +60,15 @@ impl Normal {
             Some(last) => last.solver.renewed(loops, &pairs)?,
             None => SymmetricSolver::with_border(equations, loops, &pairs)?,
         };
+        let mean = diagonal.iter().sum::<f64>() / equations.max(1) as f64;
+        let mut shifted = 0.0;
         let mut result = Ok(());
         for shift in SHIFTS {
-            let shifted: Vec<f64> = diagonal.iter().map(|d| d * (1.0 + shift)).collect();
-            result = solver.factorize(&shifted, &values);
+            diagonal
+                .iter_mut()
+                .for_each(|d| *d += (shift - shifted) * mean);
+            shifted = shift;
+            result = solver.factorize(&diagonal, &values);
             if result.is_ok() {
                 break;
             }
