@@ -1,6 +1,6 @@
 //! Sharp edges as lines of the atlas, on a part with junctions of three and four of them.
 
-use crate::command::{build_small, document, verify};
+use crate::command::{build, build_small, document, verify};
 use crate::real_models::arrays::array;
 use crate::real_models::lines::lines;
 use std::collections::BTreeMap;
@@ -100,7 +100,14 @@ fn edges_of_a_chair_are_lines() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mesh = folder.path().join("chair.obj");
     std::fs::write(&mesh, include_str!("features/chair.obj")).expect("writable");
-    let built = build_small(&mesh, &[]);
+    let built = build(
+        &mesh,
+        &[
+            "report.enabled=false",
+            "images.domain=grid",
+            "grid.cells=200",
+        ],
+    );
     assert_eq!(built.code(), Some(0), "{}", built.message());
     let atlas = built.atlas();
     verify(&atlas);
