@@ -292,16 +292,23 @@ fn an_edge_of_length_zero_is_collapsed() {
     assert_eq!(result.locate(v as u32), result.locate(w as u32));
 }
 
-#[test]
-fn a_collinear_face_goes_and_the_surface_stays_closed() {
+/// A cube of 4, in whose bottom the corner of a face is moved to the side opposite, all but this part of the way.
+fn squeezed_cube(aside: f64) -> Soup {
     let mut cube = cube(4);
     let at = |p: [f64; 3]| cube.positions.iter().position(|&q| q == p).unwrap();
     let v = at([2.0, 2.0, 0.0]);
-    // In the bottom, vertex v moves onto the side opposite to it in one of its faces.
     let face = *cube.faces.iter().find(|f| f.contains(&(v as u32))).unwrap();
     let others: Vec<u32> = face.into_iter().filter(|&w| w as usize != v).collect();
     let [p, q] = [others[0], others[1]].map(|w| cube.positions[w as usize]);
-    cube.positions[v] = std::array::from_fn(|i| 0.25 * p[i] + 0.75 * q[i]);
+    let own = cube.positions[v];
+    cube.positions[v] =
+        std::array::from_fn(|i| (1.0 - aside) * (0.25 * p[i] + 0.75 * q[i]) + aside * own[i]);
+    cube
+}
+
+#[test]
+fn a_collinear_face_goes_and_the_surface_stays_closed() {
+    let cube = squeezed_cube(0.0);
     let result = repaired(&cube);
     let mesh = only(&result);
     assert_eq!(chi(mesh), 2);
@@ -353,16 +360,7 @@ fn what_float32_rounds_twice_is_one_point() {
 #[test]
 fn a_corner_that_float32_rounds_off_its_line_is_on_it() {
     for (aside, removed) in [(5e-7, 1), (1e-4, 0)] {
-        let mut cube = cube(4);
-        let at = |p: [f64; 3]| cube.positions.iter().position(|&q| q == p).unwrap();
-        let v = at([2.0, 2.0, 0.0]);
-        let face = *cube.faces.iter().find(|f| f.contains(&(v as u32))).unwrap();
-        let others: Vec<u32> = face.into_iter().filter(|&w| w as usize != v).collect();
-        let [p, q] = [others[0], others[1]].map(|w| cube.positions[w as usize]);
-        let own = cube.positions[v];
-        cube.positions[v] =
-            std::array::from_fn(|i| (1.0 - aside) * (0.25 * p[i] + 0.75 * q[i]) + aside * own[i]);
-        let result = repaired(&cube);
+        let result = repaired(&squeezed_cube(aside));
         assert_eq!(chi(only(&result)), 2);
         assert!((area(only(&result)) - 6.0 * 16.0).abs() < 1e-12);
         assert_eq!(count(&result, "removed_collinear_faces"), removed);
