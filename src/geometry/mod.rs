@@ -3,6 +3,7 @@ pub mod connectivity;
 pub mod curvature;
 pub mod deviation;
 pub(crate) mod disjoint_sets;
+pub(crate) mod fill;
 pub mod frame;
 pub mod ids;
 pub mod mesh;

@@ -42,6 +42,7 @@ pub(crate) mod npz;
 mod obj;
 mod off;
 mod ply;
+mod polygon;
 mod stl;
 mod text;
 

@@ -1,11 +1,12 @@
 //! Wavefront OBJ: polygons with shared positions, texture coordinates and normals.
 //!
-//! Every `v` is a vertex, in file order and also where no face uses it. A polygon is fanned from its
-//! first corner. Of materials only the names are kept, of `v` weights nothing (they concern curves).
+//! Every `v` is a vertex, in file order and also where no face uses it. Of
+//! materials only the names are kept, of `v` weights nothing (they concern curves).
 //! Colours written after positions, as many programs do, are kept as they are where every vertex has one.
 
 use super::build::SoupBuilder;
 use super::error::{Place, ReadProblem, shorten};
+use super::polygon::triangulate;
 use super::text::{Lines, integer, number, words};
 use crate::geometry::ids::NONE;
 use crate::geometry::mesh::{AttributeKind, Material};
@@ -188,8 +189,12 @@ impl Obj {
                 corners: polygon.len(),
             });
         }
-        for pair in polygon[1..].windows(2) {
-            let triangle = [polygon[0], pair[0], pair[1]];
+        let positions = &build.soup.positions;
+        let triangles = triangulate(polygon.len(), |k| {
+            positions.get(polygon[k][0] as usize).copied()
+        });
+        for triangle in triangles {
+            let triangle = triangle.map(|k| polygon[k]);
             build.face(triangle.map(|c| c[0]), self.material.unwrap_or(NONE))?;
             for (list, indices) in self.corners.iter_mut().enumerate() {
                 let values = triangle.map(|c| c[list + 1]);

@@ -6,6 +6,7 @@
 
 use super::build::SoupBuilder;
 use super::error::{Place, ReadProblem, shorten};
+use super::polygon::triangulate;
 use super::text::{Lines, integer, number, words};
 use crate::geometry::ids::NONE;
 use crate::geometry::mesh::AttributeKind;
@@ -221,12 +222,12 @@ fn read_face(words: &[&[u8]], place: Place, build: &mut SoupBuilder) -> Result<(
             first: 0,
         })
     };
-    let first = index(indices[0])?;
-    let mut previous = index(indices[1])?;
-    for word in &indices[2..corners] {
-        let next = index(word)?;
-        build.face([first, previous, next], NONE)?;
-        previous = next;
+    let polygon = indices[..corners].iter().map(|word| index(word));
+    let polygon = polygon.collect::<Result<Vec<u32>, _>>()?;
+    let positions = &build.soup.positions;
+    let triangles = triangulate(corners, |k| positions.get(polygon[k] as usize).copied());
+    for triangle in triangles {
+        build.face(triangle.map(|k| polygon[k]), NONE)?;
     }
     Ok(())
 }

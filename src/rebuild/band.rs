@@ -14,11 +14,10 @@ use super::crossing::{cells_along, crossings};
 use super::frame::Frame;
 use super::{PatchImage, RebuildError};
 use crate::atlas::plane::{distance, rotate};
+use crate::geometry::fill::fill;
 use crate::geometry::mesh::{self, distance_to_segment};
 use crate::geometry::polygon::is_counterclockwise;
 use rustc_hash::FxHashMap;
-use spade::handles::FixedVertexHandle;
-use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation, mitigate_underflow};
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
@@ -311,42 +310,6 @@ fn inside(border: &[[f64; 2]], width: usize, height: usize) -> Vec<bool> {
         }
     }
     inside
-}
-
-/// The triangles left of the fixed edges and all that are reached from there without crossing one.
-fn fill(points: &[[f64; 2]], fixed: &[[usize; 2]]) -> Option<Vec<[u32; 3]>> {
-    type Plane = ConstrainedDelaunayTriangulation<Point2<f64>>;
-    let vertices = points
-        .iter()
-        .map(|p| mitigate_underflow(Point2::new(p[0], p[1])))
-        .collect();
-    let mut conflicts = 0;
-    let plane = Plane::try_bulk_load_cdt(vertices, fixed.to_vec(), |_| conflicts += 1).ok()?;
-    if conflicts > 0 || plane.num_vertices() != points.len() {
-        return None;
-    }
-    let mut taken = vec![false; plane.num_all_faces()];
-    let mut stack = Vec::new();
-    for &[a, b] in fixed {
-        let [a, b] = [a, b].map(FixedVertexHandle::from_index);
-        let face = plane.get_edge_from_neighbors(a, b)?.face();
-        stack.push(face.as_inner()?.fix());
-    }
-    let mut faces = Vec::new();
-    while let Some(face) = stack.pop() {
-        if std::mem::replace(&mut taken[face.index()], true) {
-            continue;
-        }
-        let face = plane.face(face);
-        faces.push(face.vertices().map(|v| v.fix().index() as u32));
-        for edge in face.adjacent_edges() {
-            if !edge.is_constraint_edge() {
-                // Beyond the hull there is no border left to stop at.
-                stack.push(edge.rev().face().as_inner()?.fix());
-            }
-        }
-    }
-    Some(faces)
 }
 
 /// How many of the fixed edges, and of these only, faces do not end at. Whole cells fill what is beyond the outline.

@@ -3,7 +3,7 @@
 //! Kept: positions, normals (`nx ny nz`), texture coordinates (`s t`, `u v`, `texture_u texture_v`),
 //! colours (`red green blue`, optionally `alpha`), every other scalar of a vertex under its own name, and
 //! texture coordinates a face corner (`texcoord`). Faces are lists `vertex_indices` or `vertex_index`,
-//! fanned from their first corner, and triangle strips (`tristrips`, −1 begins a new strip; triangles that
+//! and triangle strips (`tristrips`, −1 begins a new strip; triangles that
 //! repeat a vertex only join strips and are dropped). Other elements and properties are skipped and noted.
 
 mod body;
@@ -11,6 +11,7 @@ mod header;
 
 use super::build::SoupBuilder;
 use super::error::{Place, ReadProblem, shorten};
+use super::polygon::triangulate;
 use crate::geometry::ids::NONE;
 use crate::geometry::mesh::AttributeKind;
 use body::Body;
@@ -232,9 +233,15 @@ fn read_faces(
         }
         let index = |k: usize| vertex_index(indices[k], vertices, face, place);
         let wedge = |k: usize| [texture[2 * k] as f32, (1.0 - texture[2 * k + 1]) as f32];
-        for k in 2..indices.len() {
-            let triangle = [0, k - 1, k];
-            build.face([index(0)?, index(k - 1)?, index(k)?], NONE)?;
+        let polygon = (0..indices.len())
+            .map(index)
+            .collect::<Result<Vec<u32>, _>>()?;
+        let positions = &build.soup.positions;
+        let triangles = triangulate(polygon.len(), |k| {
+            positions.get(polygon[k] as usize).copied()
+        });
+        for triangle in triangles {
+            build.face(triangle.map(|k| polygon[k]), NONE)?;
             if texture.len() == 2 * indices.len() {
                 wedges.resize(6 * (build.soup.faces.len() - 1), f32::NAN);
                 wedges.extend(triangle.into_iter().flat_map(wedge));
