@@ -219,6 +219,10 @@ impl Sheet {
                     _ if goal.is_some() => continue,
                     p => [0.0, -p],
                 };
+                // Lines with goals have nothing in common but their ends: where two leave a vertex side by side, one through a vertex of the other would cut off what lies between them.
+                if goal.is_some_and(|goal| end != goal && self.is_on_line(end)) {
+                    continue;
+                }
                 if is_along(edge, to) && best.is_none_or(|(most, ..)| rank > most) {
                     best = Some((rank, aim, h));
                 }
@@ -237,6 +241,15 @@ impl Sheet {
             .beside(aim, goal, may_move)
             .map_or(Way::Into, Way::Along);
         Some((aim, way))
+    }
+
+    fn is_on_line(&self, v: VertexId) -> bool {
+        let c = &self.fine.connectivity;
+        let mut edges = c
+            .outgoing(v)
+            .flat_map(|h| [h, c.prev(h)])
+            .map(|h| c.edge(h));
+        edges.any(|e| self.line[e] != NONE)
     }
 
     /// Of the edges of a corner, one whose other end may be moved onto a line that runs into the face beside it, which saves a thin face.
