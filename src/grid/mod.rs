@@ -38,7 +38,7 @@ mod walk;
 pub use distortion::Distortion;
 pub use error::GridError;
 pub use params::{Density, GridParams, MOST_CELLS};
-pub(crate) use refine::refined;
+pub(crate) use refine::{is_coarse, refined, spacings};
 
 use crate::atlas::charted::{self, Charted};
 use crate::atlas::geometry_image::GeometryImage;

@@ -1,93 +1,241 @@
-//! Small meshes with enough vertices for the cones of a grid.
+//! Coarse meshes with vertices wherever cones of a grid may be wanted.
 //!
-//! *Enters:* a mesh. *Leaves:* the same surface, whose longest edges are divided into three one after another until it has enough faces. *Guaranteed:* new vertices lie on old edges, old ones keep their numbers.
+//! *Enters:* a mesh. *Leaves:* the same surface, with vertices on long edges so that no wide part of it is without. *Guaranteed:* new vertices lie on old edges and keep their distance from each other and from old ones, which bounds
+//! their number; old vertices keep their numbers; a mesh without long edges stays as it is.
 //!
-//! Halves would lie where texels of a cell lie, too: these would be on edges of faces, which say little of them.
-//!
-//! A tetrahedron needs eight cones of three quarter turns and has four vertices; a triangle needs one inside and has none there.
+//! Cones are vertices. A tetrahedron needs eight cones of three quarter turns and has four vertices; a flat end of a cylinder, all of whose vertices lie around it, wants four cones of three
+//! cells inside, and would have cells there with a corner of half a turn.
 
 use crate::atlas::charted::lift_mesh;
 use crate::geometry::ids::EdgeId;
-use crate::geometry::mesh::Mesh;
+use crate::geometry::mesh::{Mesh, cross, distance, dot, sub, triangle_area};
 use crate::geometry::subdivision::Subdivision;
+use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// Meshes with fewer faces are refined.
-const FACES: usize = 200;
+/// The squares of the least distances between new vertices, in parts of the surface's area, for a number of cells: of a first attempt, and of a second where float64 does not hold what comes
+/// of the first.
+pub(crate) fn spacings(cells: usize) -> [f64; 2] {
+    // About two cells, but for small parts of a file and for very fine grids.
+    let vertices = (cells as f64 / 5.0).clamp(100.0, 400.0);
+    [1.0 / vertices, 0.25 / vertices]
+}
+
+/// Where an edge may be split, one after another. Not in halves, where texels of a cell lie, too: these would be on edges of faces, which say little of them.
+const PARTS: [f64; 4] = [0.47, 0.53, 0.38, 0.62];
+
+/// Half of the length beyond which an edge of a mesh is long.
+fn apart(mesh: &Mesh, spacing: f64) -> f64 {
+    let faces = mesh.connectivity.faces();
+    let area: f64 = faces.map(|f| triangle_area(mesh.face_positions(f))).sum();
+    (spacing * area).sqrt()
+}
+
+/// Whether a mesh has long edges.
+pub(crate) fn is_coarse(mesh: &Mesh, spacing: f64) -> bool {
+    let long = 2.0 * apart(mesh, spacing);
+    let mut edges = mesh.connectivity.edges();
+    edges.any(|e| mesh.edge_length(e) > long)
+}
 
 /// See the module docs.
-pub(crate) fn refined(mesh: Mesh) -> Mesh {
-    if mesh.connectivity.face_count() >= FACES {
+pub(crate) fn refined(mesh: Mesh, spacing: f64) -> Mesh {
+    if !is_coarse(&mesh, spacing) {
         return mesh;
+    }
+    let apart = apart(&mesh, spacing);
+    let is_long = |length: f64| length > 2.0 * apart;
+    let mut places = Places::new(apart);
+    for &p in mesh.positions.as_slice() {
+        places.take(p, None);
     }
     let mut fine = Subdivision::identity(&mesh);
     // Lengths of equal edges may differ in their last digits.
     let length = |fine: &Subdivision, e: EdgeId| {
         let [a, b] = fine.connectivity.edge_vertices(e);
-        let (p, q) = (fine.position[a], fine.position[b]);
-        let squared: f64 = (0..3).map(|i| (p[i] - q[i]).powi(2)).sum();
-        squared as f32
+        distance(fine.position[a], fine.position[b]) as f32
     };
     let mut longest = BinaryHeap::new();
-    for e in fine.connectivity.edges() {
-        longest.push((length(&fine, e).to_bits(), Reverse(e)));
+    let push = |longest: &mut BinaryHeap<_>, fine: &Subdivision, e: EdgeId| {
+        let length = length(fine, e);
+        if is_long(f64::from(length)) {
+            longest.push((length.to_bits(), Reverse(e)));
+        }
+    };
+    for e in mesh.connectivity.edges() {
+        push(&mut longest, &fine, e);
     }
     while let Some((bits, Reverse(e))) = longest.pop() {
-        if fine.connectivity.face_count() >= FACES {
-            break;
-        }
         if bits != length(&fine, e).to_bits() {
             continue;
         }
-        let [_, end] = fine.connectivity.edge_vertices(e);
-        let first = fine.split_edge(e, 1.0 / 3.0);
+        let normal = normal(&fine, e);
+        let [a, b] = fine.connectivity.edge_vertices(e).map(|v| fine.position[v]);
+        let at = |t: f64| std::array::from_fn(|i| (1.0 - t) * a[i] + t * b[i]);
+        let Some(part) = PARTS.into_iter().find(|&t| places.is_free(at(t), normal)) else {
+            continue;
+        };
+        let vertex = fine.split_edge(e, part);
+        places.take(fine.position[vertex], Some(normal));
         let c = &fine.connectivity;
-        let rest = c.outgoing(first).find(|&h| c.head(h) == end);
-        let second = rest.map(|h| c.edge(h)).map(|e| fine.split_edge(e, 0.5));
-        let c = &fine.connectivity;
-        let around: Vec<EdgeId> = [Some(first), second]
-            .into_iter()
-            .flatten()
-            .flat_map(|v| c.outgoing(v))
-            .flat_map(|h| [c.edge(h), c.edge(c.prev(h))])
-            .collect();
+        let around: Vec<EdgeId> = c.outgoing(vertex).map(|h| c.edge(h)).collect();
         for e in around {
-            longest.push((length(&fine, e).to_bits(), Reverse(e)));
+            push(&mut longest, &fine, e);
         }
     }
     lift_mesh(mesh, &fine)
 }
 
+/// Sum of the normals of an edge's faces, by their areas.
+fn normal(fine: &Subdivision, e: EdgeId) -> [f64; 3] {
+    let c = &fine.connectivity;
+    let h = c.edge_halfedge(e);
+    let mut sum = [0.0; 3];
+    for f in [Some(h), c.twin(h)]
+        .into_iter()
+        .flatten()
+        .map(|h| c.face(h))
+    {
+        let [p, q, r] = c.face_vertices(f).map(|v| fine.position[v]);
+        let normal = cross(sub(q, p), sub(r, p));
+        (0..3).for_each(|i| sum[i] += normal[i]);
+    }
+    sum
+}
+
+/// A point and, if it is new, its normal.
+type Place = ([f64; 3], Option<[f64; 3]>);
+
+/// Points in space that others keep their distance from.
+struct Places {
+    apart: f64,
+    /// By cubes whose sides are that distance.
+    taken: FxHashMap<[i64; 3], Vec<Place>>,
+}
+
+impl Places {
+    fn new(apart: f64) -> Self {
+        Self {
+            apart,
+            taken: FxHashMap::default(),
+        }
+    }
+
+    fn cube(&self, p: [f64; 3]) -> [i64; 3] {
+        p.map(|x| (x / self.apart).floor() as i64)
+    }
+
+    fn take(&mut self, p: [f64; 3], normal: Option<[f64; 3]>) {
+        self.taken
+            .entry(self.cube(p))
+            .or_default()
+            .push((p, normal));
+    }
+
+    /// No point is near, but new ones on the other side of something thin.
+    fn is_free(&self, p: [f64; 3], normal: [f64; 3]) -> bool {
+        let [x, y, z] = self.cube(p);
+        let around = |x: i64| x.saturating_sub(1)..=x.saturating_add(1);
+        let cubes =
+            around(x).flat_map(|x| around(y).flat_map(move |y| around(z).map(move |z| [x, y, z])));
+        let mut near = cubes.filter_map(|cube| self.taken.get(&cube)).flatten();
+        near.all(|&(q, other)| {
+            distance(p, q) >= self.apart || other.is_some_and(|n| dot(n, normal) < 0.0)
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::mesh::triangle_area;
+    use crate::geometry::mesh::Soup;
     use crate::geometry::polycube::polycube;
+    use crate::repair::{RepairParams, repair};
+    use std::f64::consts::TAU;
+
+    const SPACING: f64 = 1.0 / 400.0;
+
+    fn area(mesh: &Mesh) -> f64 {
+        let faces = mesh.connectivity.faces();
+        faces
+            .map(|f| triangle_area(mesh.face_positions(f)))
+            .sum::<f64>()
+    }
+
+    /// Refines; checks what is guaranteed, and returns the surface and the least distance of new vertices.
+    fn checked(mesh: &Mesh) -> (Mesh, f64) {
+        let apart = (SPACING * area(mesh)).sqrt();
+        let fine = refined(mesh.clone(), SPACING);
+        assert!((area(&fine) - area(mesh)).abs() < 1e-12 * area(mesh));
+        let (old, new) = (mesh.positions.as_slice(), fine.positions.as_slice());
+        assert_eq!(&new[..old.len()], old);
+        let topology = |mesh: &Mesh| mesh.connectivity.topology().euler_characteristic;
+        assert_eq!(topology(&fine), topology(mesh));
+        for (i, &p) in new.iter().enumerate().skip(old.len()) {
+            let nearest = new[..i].iter().map(|&q| distance(p, q));
+            let nearest = nearest.fold(f64::INFINITY, f64::min);
+            assert!(nearest >= apart, "{nearest} of {apart}");
+        }
+        (fine, apart)
+    }
 
     #[test]
     fn a_cube_gets_vertices_on_its_edges_and_faces() {
-        let mesh = polycube([[0, 0, 0]], |_, _, _| true);
-        let area = |mesh: &Mesh| {
-            let faces = mesh.connectivity.faces();
-            faces
-                .map(|f| triangle_area(mesh.face_positions(f)))
-                .sum::<f64>()
-        };
-        let (vertices, before) = (mesh.positions.len(), area(&mesh));
-        let topology = mesh.connectivity.topology();
-        let fine = refined(mesh.clone());
-        assert!((FACES..FACES + 4).contains(&fine.connectivity.face_count()));
-        assert!((area(&fine) - before).abs() < 1e-12);
-        assert_eq!(
-            fine.positions.as_slice()[..vertices],
-            *mesh.positions.as_slice()
-        );
-        let after = fine.connectivity.topology();
-        assert_eq!(after.euler_characteristic, topology.euler_characteristic);
-        // None is longer than half of what faces of that number have.
+        let (fine, apart) = checked(&polycube([[0, 0, 0]], |_, _, _| true));
         let c = &fine.connectivity;
         let longest = c.edges().map(|e| fine.edge_length(e)).fold(0.0, f64::max);
-        assert!(longest < 0.6, "{longest}");
+        assert!(longest < 3.0 * apart, "{longest} of {apart}");
+        assert!(
+            (150..400).contains(&c.vertex_count()),
+            "{}",
+            c.vertex_count()
+        );
+        // Once is enough, nearly.
+        let again = refined(fine.clone(), SPACING).positions.len();
+        assert!(again < fine.positions.len() + 10);
+    }
+
+    #[test]
+    fn ends_of_a_cylinder_get_vertices_inside() {
+        let n = 48u32;
+        let corner = |k: u32, z: f64| {
+            let (y, x) = (TAU * f64::from(k) / f64::from(n)).sin_cos();
+            [x, y, z]
+        };
+        let positions = (0..2 * n).map(|k| corner(k % n, f64::from(k / n)));
+        let mut faces = Vec::new();
+        for k in 0..n {
+            let next = (k + 1) % n;
+            faces.extend([[k, next, n + next], [k, n + next, n + k]]);
+        }
+        for k in 1..n - 1 {
+            faces.extend([[0, k + 1, k], [n, n + k, n + k + 1]]);
+        }
+        let soup = Soup::from_triangles(positions.collect(), faces);
+        let repaired = repair(&soup, &RepairParams::default()).expect("a cylinder");
+        let component = repaired.components.into_iter().next().expect("one");
+        let frame = component.frame;
+        let (fine, apart) = checked(&component.mesh.expect("connected"));
+        // Wherever one stands on an end, a vertex is not far.
+        let ends = |p: &[f64; 3]| (frame.leave(*p)[2] - 0.5).abs() > 0.5 - 1e-9;
+        let vertices: Vec<_> = fine.positions.iter().filter(|p| ends(p)).collect();
+        for (i, j) in (-9..10).flat_map(|i| (-9..10).map(move |j| (i, j))) {
+            let at = [f64::from(i) / 10.0, f64::from(j) / 10.0, 0.0];
+            if at[0].hypot(at[1]) < 1.0 {
+                let p = frame.enter(at);
+                let near = vertices.iter().map(|q| distance(p, **q));
+                let near = near.fold(f64::INFINITY, f64::min);
+                assert!(near < 2.0 * apart, "{at:?}: {near} of {apart}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_fine_mesh_stays() {
+        let cubes = (0..20).flat_map(|i| (0..20).map(move |j| [i, j, 0]));
+        let mesh = polycube(cubes, |_, _, _| true);
+        let fine = refined(mesh.clone(), SPACING);
+        assert_eq!(fine.connectivity, mesh.connectivity);
     }
 }

@@ -40,11 +40,12 @@ pub(super) struct Charting {
     pub connectivity_repair: ConnectivityRepair,
 }
 
-/// Cones, flow, cut and charts. `enter` is told each stage's name before it begins, and may stop the job.
+/// Cones, flow, cut and charts; `spacing` is that of new vertices, for a grid. `enter` is told each stage's name before it begins, and may stop the job.
 pub(super) fn chart(
     component: Component,
     requests: &Requests,
     config: &Config,
+    spacing: f64,
     observer: &dyn Observer,
     enter: &impl Fn(&'static str) -> Result<(), BuildError>,
 ) -> Result<Charting, BuildError> {
@@ -58,7 +59,7 @@ pub(super) fn chart(
     }
     let mesh = match config.domain() {
         // Features that were named are edges of the mesh as it is.
-        Domain::Grid if requests.features.is_empty() => grid::refined(mesh),
+        Domain::Grid if requests.features.is_empty() => grid::refined(mesh, spacing),
         _ => mesh,
     };
     let prescription = prescribed(&mesh, requests, config)?;

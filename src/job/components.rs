@@ -8,6 +8,7 @@ use crate::atlas::patch::Domain;
 use crate::config::Config;
 use crate::flow::cones::{self, Requests};
 use crate::geometry::mesh::Soup;
+use crate::grid;
 use crate::observe::Observer;
 use crate::parallel;
 use crate::product::AffineAtlas;
@@ -51,7 +52,12 @@ pub(super) struct Part<'a> {
 impl Part<'_> {
     /// Its atlas, of flat patches where a grid cannot be made.
     pub fn atlas(&self) -> Result<AffineAtlas, BuildError> {
-        let atlas = self.built(&self.requests, &self.config, None);
+        let on_grid = |spacing| self.built(&self.requests, &self.config, spacing, None);
+        let mut atlas = on_grid(self.spacings()[0]);
+        if let (Err(BuildError::Grid(error)), Some(spacing)) = (&atlas, self.finer()) {
+            tracing::debug!(%error, "again with more vertices");
+            atlas = on_grid(spacing);
+        }
         match atlas {
             Err(error)
                 if !matches!(error, BuildError::Cancelled)
@@ -64,25 +70,46 @@ impl Part<'_> {
         }
     }
 
-    /// Builds it on other grids, one after the other: with more cells, whose lines leave no slivers where those of fewer did, and without sharp edges as lines.
-    pub fn on_other_grids(&self) -> impl Iterator<Item = Result<AffineAtlas, BuildError>> {
+    /// Those of new vertices, at first and where that fails.
+    fn spacings(&self) -> [f64; 2] {
+        grid::spacings(self.config.grid.cells)
+    }
+
+    /// The spacing with which the mesh gets more vertices than at first, if there is room for some.
+    fn finer(&self) -> Option<f64> {
+        let [_, spacing] = self.spacings();
+        let mesh = self.component.mesh.as_ref().ok();
+        mesh.filter(|mesh| grid::is_coarse(mesh, spacing))
+            .map(|_| spacing)
+    }
+
+    /// Builds it on other grids, one after the other: with more vertices, whose triangles are less thin; then, unless it is noise, with more cells, whose lines leave no slivers where those
+    /// of fewer did, and without sharp edges as lines.
+    pub fn on_other_grids(
+        &self,
+        is_noise: bool,
+    ) -> impl Iterator<Item = Result<AffineAtlas, BuildError>> {
         let (mut more, mut smooth) = (self.config.clone(), self.config.clone());
         more.grid.cells = (1.1 * more.grid.cells as f64).round() as usize;
         smooth.features.angle = 180.0;
-        let configs = [more, smooth].into_iter();
-        configs.map(|config| self.built(&self.requests, &config, None))
+        let finer = self.finer().map(|spacing| (spacing, self.config.clone()));
+        let others = [more, smooth].map(|config| (self.spacings()[0], config));
+        let others = others.into_iter().filter(move |_| !is_noise);
+        let ways = finer.into_iter().chain(others);
+        ways.map(|(spacing, config)| self.built(&self.requests, &config, spacing, None))
     }
 
     /// Builds it of flat patches, for this reason.
     pub fn without_grid(&self, reason: String) -> Result<AffineAtlas, BuildError> {
         let (requests, config) = &self.flat;
-        self.built(requests, config, Some(reason))
+        self.built(requests, config, self.spacings()[0], Some(reason))
     }
 
     fn built(
         &self,
         requests: &Requests,
         config: &Config,
+        spacing: f64,
         no_grid: Option<String>,
     ) -> Result<AffineAtlas, BuildError> {
         let component = self.component.clone();
@@ -92,7 +119,10 @@ impl Part<'_> {
             components: self.components,
         };
         let enter = |stage| observed.enter(stage);
-        pipeline(component, requests, config, no_grid, self.observer, &enter)
+        let observer = self.observer;
+        pipeline(
+            component, requests, config, spacing, no_grid, observer, &enter,
+        )
     }
 
     fn is_small(&self) -> bool {

@@ -15,11 +15,13 @@ use crate::rebuild::Images;
 use crate::repair::Component;
 use crate::report;
 
-/// The pipeline. `enter` is told each stage's name before it begins, and may stop the job; `no_grid` says why there is none where one was wanted.
+/// The pipeline. `enter` is told each stage's name before it begins, and may stop the job; `spacing` is that of vertices that a coarse mesh gets for a grid,
+/// `no_grid` says why there is none where one was wanted.
 pub(super) fn pipeline(
     component: Component,
     requests: &Requests,
     config: &Config,
+    spacing: f64,
     no_grid: Option<String>,
     observer: &dyn Observer,
     enter: &impl Fn(&'static str) -> Result<(), BuildError>,
@@ -34,7 +36,7 @@ pub(super) fn pipeline(
         frame,
         log,
         connectivity_repair,
-    } = chart(component, requests, config, observer, enter)?;
+    } = chart(component, requests, config, spacing, observer, enter)?;
     let (surface, patches, grid, no_grid) = match config.domain() {
         Domain::Flat => {
             enter("patches")?;

@@ -118,10 +118,12 @@ impl<'a> Publication<'a> {
             let reason = error.to_string();
             let mean = |g: &Grid| g.distortion.symmetric_dirichlet.mean;
             let is_noise = atlas.grid.as_ref().map(mean) > Some(MOST_ENERGY);
-            let tries = if is_noise { 0 } else { usize::MAX };
-            let grids = part.on_other_grids().take(tries);
+            let grids = part.on_other_grids(is_noise);
             let flat = std::iter::once_with(|| part.without_grid(reason));
             for other in grids.chain(flat) {
+                if let Err(error) = &added {
+                    tracing::debug!(%error, "again on another grid, or on flat patches");
+                }
                 match other {
                     Err(BuildError::Cancelled) => return Err(BuildError::Cancelled),
                     Err(error) => added = Err(error),

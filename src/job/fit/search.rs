@@ -8,7 +8,7 @@ use crate::grid::{self, GridError, MOST_CELLS};
 use crate::job::charting::{Charting, chart};
 use crate::job::{BuildError, shares};
 use crate::read;
-use crate::repair;
+use crate::repair::{self, Component};
 use crate::spline::{self, Gridded, Spline};
 use std::path::Path;
 
@@ -48,13 +48,22 @@ pub(super) fn of_mesh(
             _ => component_name(index),
         };
         let config = shares::of_share(&config, share).map_err(BuildError::from)?;
-        let charting = chart(component, &requests, &config, &(), &|_| Ok(()))?;
-        let spline = match params.size {
-            Size::Default | Size::Cells(_) => one(&charting, &config, &name, config.grid.cells)?,
-            Size::OfDiagonal(part) => coarsest(&charting, &config, &name, |_| part)?,
-            Size::Length(length) => coarsest(&charting, &config, &name, |d| length / d)?,
+        let fitted = |component: Component, spacing: f64| {
+            let charting = chart(component, &requests, &config, spacing, &(), &|_| Ok(()))?;
+            match params.size {
+                Size::Default | Size::Cells(_) => one(&charting, &config, &name, config.grid.cells),
+                Size::OfDiagonal(part) => coarsest(&charting, &config, &name, |_| part),
+                Size::Length(length) => coarsest(&charting, &config, &name, |d| length / d),
+            }
         };
-        splines.push((name, spline));
+        let [first, second] = grid::spacings(config.grid.cells);
+        let mesh = component.mesh.as_ref();
+        let is_coarse = mesh.is_ok_and(|mesh| grid::is_coarse(mesh, second));
+        let mut spline = fitted(component.clone(), first);
+        if is_coarse && matches!(spline, Err(FitAssetError::Grid { .. })) {
+            spline = fitted(component, second);
+        }
+        splines.push((name.clone(), spline?));
     }
     Ok(splines)
 }
