@@ -14,12 +14,12 @@ use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// The squares of the least distances between new vertices, in parts of the surface's area, for a number of cells: of a first attempt, and of a second where float64 does not hold what comes
-/// of the first.
-pub(crate) fn spacings(cells: usize) -> [f64; 2] {
+/// The squares of the least distances between new vertices, in parts of the surface's area, for a number of cells: of a first attempt, and of others where float64 does not hold what comes
+/// of the first; with the last a mesh stays as it is.
+pub(crate) fn spacings(cells: usize) -> [f64; 4] {
     // About two cells, but for small parts of a file and for very fine grids.
     let vertices = (cells as f64 / 5.0).clamp(100.0, 400.0);
-    [1.0 / vertices, 0.25 / vertices]
+    [1.0, 0.25, 4.0, f64::INFINITY].map(|factor| factor / vertices)
 }
 
 /// Where an edge may be split, one after another. Not in halves, where texels of a cell lie, too: these would be on edges of faces, which say little of them.

@@ -199,6 +199,7 @@ impl Sheet {
         };
         // The one that ends at the target; or else the longest that ends before it, so that no thin face has all corners on the line.
         let mut best: Option<([f64; 2], Aim, HalfedgeId)> = None;
+        let mut touching = best;
         for &aim in aims {
             let to = minus(aim.target, self.at(aim.corner));
             let prev = c.prev(aim.corner);
@@ -220,11 +221,12 @@ impl Sheet {
                     p => [0.0, -p],
                 };
                 // Lines with goals have nothing in common but their ends: where two leave a vertex side by side, one through a vertex of the other would cut off what lies between them.
-                if goal.is_some_and(|goal| end != goal && self.is_on_line(end)) {
-                    continue;
-                }
+                let best = match goal.is_some_and(|goal| end != goal && self.is_on_line(end)) {
+                    true => &mut touching,
+                    false => &mut best,
+                };
                 if is_along(edge, to) && best.is_none_or(|(most, ..)| rank > most) {
-                    best = Some((rank, aim, h));
+                    *best = Some((rank, aim, h));
                 }
             }
         }
@@ -236,6 +238,11 @@ impl Sheet {
             let back = self.vector(c.prev(aim.corner)).map(|x| -x);
             cross(self.vector(aim.corner), to) >= 0.0 && cross(to, back) > 0.0
         });
+        let is_open = |aim: &&Aim| self.line[c.edge(c.next(aim.corner))] == NONE;
+        let into = into.filter(|aim| touching.is_none() || is_open(aim));
+        if let (None, Some((_, aim, h))) = (into, touching) {
+            return Some((aim, Way::Along(h)));
+        }
         let &aim = into?;
         let way = self
             .beside(aim, goal, may_move)

@@ -8,7 +8,7 @@ use crate::atlas::patch::Domain;
 use crate::config::Config;
 use crate::flow::cones::{self, Requests};
 use crate::geometry::mesh::Soup;
-use crate::grid;
+use crate::grid::{self, GridError};
 use crate::observe::Observer;
 use crate::parallel;
 use crate::product::AffineAtlas;
@@ -52,11 +52,15 @@ pub(super) struct Part<'a> {
 impl Part<'_> {
     /// Its atlas, of flat patches where a grid cannot be made.
     pub fn atlas(&self) -> Result<AffineAtlas, BuildError> {
-        let on_grid = |spacing| self.built(&self.requests, &self.config, spacing, None);
-        let mut atlas = on_grid(self.spacings()[0]);
-        if let (Err(BuildError::Grid(error)), Some(spacing)) = (&atlas, self.finer()) {
-            tracing::debug!(%error, "again with more vertices");
-            atlas = on_grid(spacing);
+        let mut atlas = self.built(&self.requests, &self.config, self.spacings()[0], None);
+        for spacing in self.other_spacings() {
+            // Other triangles may do. What else is wrong with a grid stays so.
+            let Err(BuildError::Grid(GridError::NoTriangle { .. } | GridError::Lost { .. })) =
+                atlas
+            else {
+                break;
+            };
+            atlas = self.built(&self.requests, &self.config, spacing, None);
         }
         match atlas {
             Err(error)
@@ -71,19 +75,23 @@ impl Part<'_> {
     }
 
     /// Those of new vertices, at first and where that fails.
-    fn spacings(&self) -> [f64; 2] {
+    fn spacings(&self) -> [f64; 4] {
         grid::spacings(self.config.grid.cells)
     }
 
-    /// The spacing with which the mesh gets more vertices than at first, if there is room for some.
-    fn finer(&self) -> Option<f64> {
-        let [_, spacing] = self.spacings();
-        let mesh = self.component.mesh.as_ref().ok();
-        mesh.filter(|mesh| grid::is_coarse(mesh, spacing))
-            .map(|_| spacing)
+    /// Spacings other than the first with which the mesh becomes another one.
+    fn other_spacings(&self) -> Vec<f64> {
+        let [first, finer, others @ ..] = self.spacings();
+        let is_coarse = |spacing| {
+            let mesh = self.component.mesh.as_ref();
+            mesh.is_ok_and(|mesh| grid::is_coarse(mesh, spacing))
+        };
+        let others = others.into_iter().filter(|_| is_coarse(first));
+        let finer = is_coarse(finer).then_some(finer);
+        finer.into_iter().chain(others).collect()
     }
 
-    /// Builds it on other grids, one after the other: with more vertices, whose triangles are less thin; then, unless it is noise, with more cells, whose lines leave no slivers where those
+    /// Builds it on other grids, one after the other: with more vertices, whose triangles are less thin, with fewer, and with its own; then, unless it is noise, with more cells, whose lines leave no slivers where those
     /// of fewer did, and without sharp edges as lines.
     pub fn on_other_grids(
         &self,
@@ -92,10 +100,11 @@ impl Part<'_> {
         let (mut more, mut smooth) = (self.config.clone(), self.config.clone());
         more.grid.cells = (1.1 * more.grid.cells as f64).round() as usize;
         smooth.features.angle = 180.0;
-        let finer = self.finer().map(|spacing| (spacing, self.config.clone()));
+        let spacings = self.other_spacings().into_iter();
+        let spaced = spacings.map(|spacing| (spacing, self.config.clone()));
         let others = [more, smooth].map(|config| (self.spacings()[0], config));
         let others = others.into_iter().filter(move |_| !is_noise);
-        let ways = finer.into_iter().chain(others);
+        let ways = spaced.chain(others);
         ways.map(|(spacing, config)| self.built(&self.requests, &config, spacing, None))
     }
 

@@ -217,7 +217,7 @@ impl Gridded {
                     continue;
                 }
                 let [p, q] = [self.uv[f][k], self.uv[f][(k + 1) % 3]];
-                if let Some((ends, part)) = self.on_line(&cells, self.block[f], p, q) {
+                for (ends, part) in self.on_line(&cells, self.block[f], p, q) {
                     *covered.entry(ends).or_default() += part;
                 }
             }
@@ -225,14 +225,8 @@ impl Gridded {
         covered
     }
 
-    /// The edge of cells that a segment in a block lies on, and how much of it that is.
-    fn on_line(
-        &self,
-        cells: &Cells,
-        block: u32,
-        p: [f64; 2],
-        q: [f64; 2],
-    ) -> Option<([u32; 2], f64)> {
+    /// The edges of cells that a segment in a block lies on, and how much of each that is.
+    fn on_line(&self, cells: &Cells, block: u32, p: [f64; 2], q: [f64; 2]) -> Vec<([u32; 2], f64)> {
         let on = |i: usize| {
             let line = p[i].round();
             (p[i] - line).abs() <= ON_LINE && (q[i] - line).abs() <= ON_LINE
@@ -240,20 +234,28 @@ impl Gridded {
         let along = match (on(0), on(1)) {
             (true, false) => 1,
             (false, true) => 0,
-            _ => return None,
+            _ => return Vec::new(),
         };
-        let middle = [0, 1].map(|i| (p[i] + q[i]) / 2.0);
-        let (cell, at) = cells.find(block, middle)?;
-        let corners = self.cells[cell as usize];
-        let far = at[1 - along] > 0.5;
-        let ends = match (along, far) {
-            (0, false) => [0, 1],
-            (0, true) => [3, 2],
-            (_, false) => [0, 3],
-            (_, true) => [1, 2],
+        let (low, high) = (p[along].min(q[along]), p[along].max(q[along]));
+        // It may pass corners of cells.
+        let corners = (low.floor() as i64 + 1..high.ceil() as i64).map(|x| x as f64);
+        let ends: Vec<f64> = [low].into_iter().chain(corners).chain([high]).collect();
+        let of = |piece: &[f64]| {
+            let mut middle = [0, 1].map(|i| (p[i] + q[i]) / 2.0);
+            middle[along] = (piece[0] + piece[1]) / 2.0;
+            let (cell, at) = cells.find(block, middle)?;
+            let corners = self.cells[cell as usize];
+            let far = at[1 - along] > 0.5;
+            let ends = match (along, far) {
+                (0, false) => [0, 1],
+                (0, true) => [3, 2],
+                (_, false) => [0, 3],
+                (_, true) => [1, 2],
+            };
+            let [a, b] = ends.map(|k: usize| corners[k]);
+            Some(([a.min(b), a.max(b)], piece[1] - piece[0]))
         };
-        let [a, b] = ends.map(|k: usize| corners[k]);
-        Some(([a.min(b), a.max(b)], (p[along] - q[along]).abs()))
+        ends.windows(2).filter_map(of).collect()
     }
 
     /// Of the corners of faces, means of the normals of the faces around a vertex, by area; of those that lie within [`SHARP`] of the face.

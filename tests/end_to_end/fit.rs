@@ -3,6 +3,7 @@
 use crate::command::{Built, build, document, program};
 use crate::good::files;
 use serde_json::Value;
+use std::f64::consts::TAU;
 use std::path::Path;
 use std::process::Output;
 
@@ -83,6 +84,39 @@ fn a_folder_has_its_grid() {
 }
 
 /// The largest distance is below what was asked, in a unit or as a part of the diagonal, and a smaller one takes more cells.
+/// All vertices of its ends lie around them: cones of the grid need others inside.
+#[test]
+fn ends_of_a_cylinder_have_no_cell_with_a_corner_of_half_a_turn() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut text = String::new();
+    for k in 0..96 {
+        let (y, x) = (TAU * f64::from(k % 48) / 48.0).sin_cos();
+        let z = 4 * (k / 48);
+        text += &format!("v {x} {y} {z}\n");
+    }
+    for k in 0..48 {
+        let (a, b) = (k + 1, (k + 1) % 48 + 1);
+        text += &format!("f {a} {b} {} {}\n", b + 48, a + 48);
+    }
+    let ends = [(1..=48).rev().collect(), (49..=96).collect::<Vec<_>>()];
+    for end in ends {
+        let corners: Vec<String> = end.iter().map(i32::to_string).collect();
+        text += &format!("f {}\n", corners.join(" "));
+    }
+    let mesh = folder.path().join("cylinder.obj");
+    std::fs::write(&mesh, text).expect("written");
+    let into = folder.path().join("surface");
+    good(&fit(&mesh, &into, &[]));
+    let figures = figures(&into);
+    let component = &figures["components"][0];
+    assert_eq!(component["turned_over_area"], 0.0);
+    assert!(component["least_jacobian"].as_f64() > Some(0.02));
+    assert!(component["from_source"]["max_of_diagonal"].as_f64() < Some(5e-4));
+    // Two circles of 28 cells, although edges of the mesh do not end where cells do.
+    assert!(component["crease_edges"].as_u64() >= Some(40));
+    assert_eq!(component["corners"], 0);
+}
+
 #[test]
 fn tolerances_are_kept() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -12,7 +12,7 @@
 //! A x = b + λ M x/|x|, with the least eigenvalue λ, which damps a mode by its own and so needs no factor but that of A. The energy among fields of length 1 sinks until it settles.
 //!
 //! What borders say inside of a disk is z⁴ in its middle: four cones in one place, from which diffusion does not come away where the surface is symmetric. A small smooth field added to it takes them apart: z⁴ + ε.
-//! That way is gone too, and the field of less energy taken.
+//! That way is gone too, and taken where the energy is much less.
 
 use super::connection::transport;
 use super::{CrossField, FieldError};
@@ -31,6 +31,8 @@ const SETTLED: f64 = 1e-2;
 const MOST_STEPS: usize = 40;
 /// The longest number of a smooth field that is added to the one that borders and pulls say, where these are of length 1.
 const PUSH: f64 = 0.3;
+/// The field that comes of that is taken where its energy is less than this part of the other's: cones in one place cost more than half of it. Fields that differ by less are as good as each other.
+const CLEARLY: f64 = 0.8;
 /// Steps of inverse iteration for the least eigenvalue, of which one digit is enough.
 const RATE_STEPS: usize = 3;
 
@@ -211,7 +213,7 @@ impl Energy {
         let pushed = x.iter().zip(&slowest).map(|(x, s)| x + scale * s).collect();
         let fields = [x, pushed].map(|x: Vec<f64>| self.settled(&mut solver, rate, &x));
         let [plain, pushed] = fields;
-        Ok(if pushed.1 < plain.1 {
+        Ok(if pushed.1 < CLEARLY * plain.1 {
             pushed.0
         } else {
             plain.0

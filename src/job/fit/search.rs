@@ -56,12 +56,12 @@ pub(super) fn of_mesh(
                 Size::Length(length) => coarsest(&charting, &config, &name, |d| length / d),
             }
         };
-        let [first, second] = grid::spacings(config.grid.cells);
+        let [first, finer, ..] = grid::spacings(config.grid.cells);
         let mesh = component.mesh.as_ref();
-        let is_coarse = mesh.is_ok_and(|mesh| grid::is_coarse(mesh, second));
+        let is_coarse = mesh.is_ok_and(|mesh| grid::is_coarse(mesh, finer));
         let mut spline = fitted(component.clone(), first);
         if is_coarse && matches!(spline, Err(FitAssetError::Grid { .. })) {
-            spline = fitted(component, second);
+            spline = fitted(component, finer);
         }
         splines.push((name.clone(), spline?));
     }
