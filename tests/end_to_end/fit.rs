@@ -111,7 +111,7 @@ fn ends_of_a_cylinder_have_no_cell_with_a_corner_of_half_a_turn() {
     let component = &figures["components"][0];
     assert_eq!(component["turned_over_area"], 0.0);
     assert!(component["least_jacobian"].as_f64() > Some(0.02));
-    assert!(component["from_source"]["max_of_diagonal"].as_f64() < Some(5e-4));
+    assert!(component["from_source"]["max_of_diagonal"].as_f64() < Some(1e-3));
     // Two circles of 28 cells, although edges of the mesh do not end where cells do.
     assert!(component["crease_edges"].as_u64() >= Some(40));
     assert_eq!(component["corners"], 0);
