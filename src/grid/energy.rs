@@ -66,6 +66,12 @@ impl Energy {
         above.copied().collect()
     }
 
+    /// Their area.
+    pub fn area_above(&self, density: f64, place: &Places) -> f64 {
+        let above = self.above(density, place);
+        above.iter().map(|&f| self.rest[f].area).sum()
+    }
+
     pub fn is_above(&self, density: f64, f: FaceId, place: &Places) -> bool {
         self.of(f, place) > density * self.rest[f].area
     }

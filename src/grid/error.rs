@@ -139,6 +139,16 @@ pub enum GridError {
         /// A square there.
         square: u32,
     },
+    /// Most of the surface is too rough for its cells.
+    #[error(
+        "cells would be stretched more than sevenfold on {:.0} % of the surface's area, and a grid has at most {:.0} %: the surface is rougher than its cells: smooth it, or ask for more cells (grid.cells)", 100.0 * squeezed, 100.0 * most
+    )]
+    Rough {
+        /// Part of the area.
+        squeezed: f64,
+        /// Most that is accepted.
+        most: f64,
+    },
     /// A straight line from cone to cone did not arrive.
     #[error(
         "line {line} of the grid was lost in face {face}: faces there are too thin for float64's 16 digits"

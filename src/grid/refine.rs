@@ -1,7 +1,7 @@
 //! Coarse meshes with vertices wherever cones of a grid may be wanted.
 //!
-//! *Enters:* a mesh. *Leaves:* the same surface, with vertices on long edges so that no wide part of it is without. *Guaranteed:* new vertices lie on old edges and keep their distance from each other and from old ones, which bounds
-//! their number; old vertices keep their numbers; a mesh without long edges stays as it is.
+//! *Enters:* a mesh. *Leaves:* the same surface, with vertices on long edges so that no wide part of it is without. *Guaranteed:* new vertices lie on old edges and keep their distance from each other and from old ones; there are not more than
+//! fit on a wide surface of that area; old vertices keep their numbers; a mesh without long edges stays as it is.
 //!
 //! Cones are vertices. A tetrahedron needs eight cones of three quarter turns and has four vertices; a flat end of a cylinder, all of whose vertices lie around it, wants four cones of three
 //! cells inside, and would have cells there with a corner of half a turn.
@@ -66,7 +66,11 @@ pub(crate) fn refined(mesh: Mesh, spacing: f64) -> Mesh {
     for e in mesh.connectivity.edges() {
         push(&mut longest, &fine, e);
     }
-    while let Some((bits, Reverse(e))) = longest.pop() {
+    // Discs around them, as dense as discs are at most. On needles, which have no room for discs, there would be more.
+    let mut left = (2.0 / (3.0_f64.sqrt() * spacing)) as usize;
+    while left > 0
+        && let Some((bits, Reverse(e))) = longest.pop()
+    {
         if bits != length(&fine, e).to_bits() {
             continue;
         }
@@ -76,6 +80,7 @@ pub(crate) fn refined(mesh: Mesh, spacing: f64) -> Mesh {
         let Some(part) = PARTS.into_iter().find(|&t| places.is_free(at(t), normal)) else {
             continue;
         };
+        left -= 1;
         let vertex = fine.split_edge(e, part);
         places.take(fine.position[vertex], Some(normal));
         let c = &fine.connectivity;

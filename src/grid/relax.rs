@@ -10,7 +10,7 @@ use super::density::Units;
 use super::energy::{Energy, Places};
 use super::error::GridError;
 use super::map::{GridMap, Turning};
-use super::squeezed::{BEFORE_FLAT, MOST_HALVINGS, SUFFICIENT, widen};
+use super::squeezed::{BEFORE_FLAT, MOST_HALVINGS, SQUEEZED, SUFFICIENT, widen};
 use super::system::Equations;
 use super::triangle::is_turned_over;
 use crate::geometry::ids::FaceId;
@@ -30,6 +30,8 @@ pub struct Relaxed {
     pub steps: usize,
     /// Mean of ‖J‖² + ‖J⁻¹‖² before and after, 4 for an isometry.
     pub energy: [f64; 2],
+    /// Part of the area whose faces stay squeezed.
+    pub squeezed: f64,
 }
 
 /// Moves vertices until the energy is least; see the module docs.
@@ -79,10 +81,13 @@ pub(crate) fn relax(map: &mut GridMap, unit: &Units) -> Result<Relaxed, GridErro
             now = widened(&mut place, &mut turning);
         }
     }
+    let squeezed = energy.area_above(SQUEEZED, &place);
+    let area = energy.area;
     turning.put(map, &energy.corners, &place);
     Ok(Relaxed {
         steps,
-        energy: [first, now].map(|x| x / energy.area),
+        squeezed: squeezed / area,
+        energy: [first, now].map(|x| x / area),
     })
 }
 

@@ -17,7 +17,7 @@ pub(super) const SUFFICIENT: f64 = 1e-4;
 pub(super) const MOST_HALVINGS: usize = 30;
 
 /// ‖J‖² + ‖J⁻¹‖² of squeezed faces; 4 is an isometry.
-const SQUEEZED: f64 = 50.0;
+pub(super) const SQUEEZED: f64 = 50.0;
 /// Rounds over vertices of squeezed faces.
 const MOST_ROUNDS: usize = 30;
 /// Most moves: this part of the vertices, and so many besides. Where more are wanted, not a few faces are squeezed but the surface, and steps of all vertices together do better.

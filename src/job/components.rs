@@ -7,7 +7,7 @@ use super::{BuildError, pipeline::pipeline};
 use crate::atlas::patch::Domain;
 use crate::config::Config;
 use crate::flow::cones::{self, Requests};
-use crate::geometry::mesh::Soup;
+use crate::geometry::mesh::{Mesh, Soup};
 use crate::grid::{self, GridError};
 use crate::observe::Observer;
 use crate::parallel;
@@ -16,6 +16,9 @@ use crate::repair::{self, Component};
 
 /// Components of more faces are built alone.
 const SMALL: usize = 10_000;
+
+/// Components of more faces are not built again with vertices that are closer or farther.
+const FEW: usize = 2_000;
 
 /// Who watches which component.
 pub(super) struct Observed<'a> {
@@ -84,26 +87,26 @@ impl Part<'_> {
         let [first, finer, others @ ..] = self.spacings();
         let is_coarse = |spacing| {
             let mesh = self.component.mesh.as_ref();
-            mesh.is_ok_and(|mesh| grid::is_coarse(mesh, spacing))
+            // Of a mesh with many vertices others change little.
+            let few = |mesh: &&Mesh| mesh.connectivity.face_count() <= FEW;
+            mesh.ok()
+                .filter(few)
+                .is_some_and(|mesh| grid::is_coarse(mesh, spacing))
         };
         let others = others.into_iter().filter(|_| is_coarse(first));
         let finer = is_coarse(finer).then_some(finer);
         finer.into_iter().chain(others).collect()
     }
 
-    /// Builds it on other grids, one after the other: with more vertices, whose triangles are less thin, with fewer, and with its own; then, unless it is noise, with more cells, whose lines leave no slivers where those
+    /// Builds it on other grids, one after the other: with more vertices, whose triangles are less thin, with fewer, and with its own; then with more cells, whose lines leave no slivers where those
     /// of fewer did, and without sharp edges as lines.
-    pub fn on_other_grids(
-        &self,
-        is_noise: bool,
-    ) -> impl Iterator<Item = Result<AffineAtlas, BuildError>> {
+    pub fn on_other_grids(&self) -> impl Iterator<Item = Result<AffineAtlas, BuildError>> {
         let (mut more, mut smooth) = (self.config.clone(), self.config.clone());
         more.grid.cells = (1.1 * more.grid.cells as f64).round() as usize;
         smooth.features.angle = 180.0;
         let spacings = self.other_spacings().into_iter();
         let spaced = spacings.map(|spacing| (spacing, self.config.clone()));
         let others = [more, smooth].map(|config| (self.spacings()[0], config));
-        let others = others.into_iter().filter(move |_| !is_noise);
         let ways = spaced.chain(others);
         ways.map(|(spacing, config)| self.built(&self.requests, &config, spacing, None))
     }

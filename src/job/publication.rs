@@ -10,7 +10,6 @@ use super::warnings::warnings;
 use crate::config::Config;
 use crate::export::folder::{Staging, component_name};
 use crate::export::{self, ExportError, Provenance, glb, pictures, report as report_page};
-use crate::grid::{Grid, MOST_ENERGY};
 use crate::observe::{Observer, part};
 use crate::outcome::Summary;
 use crate::product::AffineAtlas;
@@ -116,9 +115,7 @@ impl<'a> Publication<'a> {
         let mut added = self.add(index, components, &mut atlas, config)?;
         if let (Err(error), true) = (&added, atlas.grid.is_some()) {
             let reason = error.to_string();
-            let mean = |g: &Grid| g.distortion.symmetric_dirichlet.mean;
-            let is_noise = atlas.grid.as_ref().map(mean) > Some(MOST_ENERGY);
-            let grids = part.on_other_grids(is_noise);
+            let grids = part.on_other_grids();
             let flat = std::iter::once_with(|| part.without_grid(reason));
             for other in grids.chain(flat) {
                 if let Err(error) = &added {
