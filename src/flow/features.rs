@@ -6,7 +6,7 @@
 pub mod file;
 
 use crate::geometry::disjoint_sets::UnionFind;
-use crate::geometry::ids::{EdgeId, EdgeVec, HalfedgeId, VertexId, VertexVec};
+use crate::geometry::ids::{EdgeId, EdgeVec, HalfedgeId, NONE, VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, cross, dot, sub, triangle_area};
 use std::cmp::Ordering;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -97,7 +97,7 @@ pub fn features(mesh: &Mesh, params: &FeatureParams, named: &[EdgeId]) -> Vec<Fe
         .sum();
     let counts = |f: &Feature| {
         let length = f.length / area.sqrt();
-        f.edges.len() >= LEAST_EDGES && length >= LEAST_LENGTH
+        given_edges(mesh, f) >= LEAST_EDGES && length >= LEAST_LENGTH
             || length >= LONG && meets_at_quarter_turns(mesh, &sharp, f)
             || f.edges.iter().any(|&e| is_named[e])
     };
@@ -123,6 +123,12 @@ pub fn features(mesh: &Mesh, params: &FeatureParams, named: &[EdgeId]) -> Vec<Fe
     let (mut forest, cycles): (Vec<_>, Vec<_>) = found.into_iter().partition(joins);
     forest.extend(cycles);
     forest
+}
+
+/// Edges of a chain that the input has: not parts of them.
+fn given_edges(mesh: &Mesh, f: &Feature) -> usize {
+    let is_given = |v: &&VertexId| mesh.source_vertex[**v] != NONE;
+    f.vertices[1..].iter().filter(is_given).count()
 }
 
 /// Whether lines along a chain and along the sharp edges and borders that it meets at both ends would turn no face by much: between it and the next, the surface
@@ -169,7 +175,7 @@ fn meets_at_quarter_turns(mesh: &Mesh, sharp: &EdgeVec<bool>, f: &Feature) -> bo
 }
 
 /// The angle of a face at the tail of a halfedge, radians; 0 where it has none.
-fn corner_angle(mesh: &Mesh, h: HalfedgeId) -> f64 {
+pub(crate) fn corner_angle(mesh: &Mesh, h: HalfedgeId) -> f64 {
     let c = &mesh.connectivity;
     let at = |v: VertexId| mesh.positions[v];
     let (p, q, r) = (at(c.tail(h)), at(c.head(h)), at(c.apex(h)));
@@ -179,7 +185,7 @@ fn corner_angle(mesh: &Mesh, h: HalfedgeId) -> f64 {
 }
 
 /// The angle between the normals of both sides, radians; 0 on the boundary and where a face has no normal.
-fn bend(mesh: &Mesh, e: EdgeId) -> f64 {
+pub(crate) fn bend(mesh: &Mesh, e: EdgeId) -> f64 {
     let c = &mesh.connectivity;
     let h = c.edge_halfedge(e);
     let Some(t) = c.twin(h) else { return 0.0 };

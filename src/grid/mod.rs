@@ -24,6 +24,7 @@ mod patches;
 pub mod quads;
 pub mod quantise;
 mod refine;
+mod regions;
 mod relax;
 pub(crate) mod sheet;
 pub(crate) mod slivers;

@@ -4,10 +4,11 @@
 //! fit on a wide surface of that area; old vertices keep their numbers; a mesh without long edges stays as it is.
 //!
 //! Cones are vertices. A tetrahedron needs eight cones of three quarter turns and has four vertices; a flat end of a cylinder, all of whose vertices lie around it, wants four cones of three
-//! cells inside, and would have cells there with a corner of half a turn.
+//! cells inside, and would have cells there with a corner of half a turn. Where sharp edges leave cones to a part of the surface, vertices are about a cell apart, elsewhere more.
 
+use super::regions::need_cones;
 use crate::atlas::charted::lift_mesh;
-use crate::geometry::ids::EdgeId;
+use crate::geometry::ids::{EdgeId, FaceId, FaceVec};
 use crate::geometry::mesh::{Mesh, cross, distance, dot, sub, triangle_area};
 use crate::geometry::subdivision::Subdivision;
 use rustc_hash::FxHashMap;
@@ -22,31 +23,43 @@ pub(crate) fn spacings(cells: usize) -> [f64; 4] {
     [1.0, 0.25, 4.0, f64::INFINITY].map(|factor| factor / vertices)
 }
 
+/// That distance where cones are needed, in parts of that elsewhere.
+const CLOSER: f64 = 0.5;
+
 /// Where an edge may be split, one after another. Not in halves, where texels of a cell lie, too: these would be on edges of faces, which say little of them.
 const PARTS: [f64; 4] = [0.47, 0.53, 0.38, 0.62];
 
-/// Half of the length beyond which an edge of a mesh is long.
-fn apart(mesh: &Mesh, spacing: f64) -> f64 {
+/// The least distance between new vertices, by faces; edges of more than twice that are long.
+fn apart(mesh: &Mesh, spacing: f64) -> FaceVec<f64> {
     let faces = mesh.connectivity.faces();
     let area: f64 = faces.map(|f| triangle_area(mesh.face_positions(f))).sum();
-    (spacing * area).sqrt()
+    let apart = (spacing * area).sqrt();
+    let need = need_cones(mesh);
+    let of_face = need.iter().map(|need| match need {
+        true => CLOSER * apart,
+        false => apart,
+    });
+    of_face.collect()
 }
 
 /// Whether a mesh has long edges.
 pub(crate) fn is_coarse(mesh: &Mesh, spacing: f64) -> bool {
-    let long = 2.0 * apart(mesh, spacing);
-    let mut edges = mesh.connectivity.edges();
-    edges.any(|e| mesh.edge_length(e) > long)
+    has_long_edges(mesh, &apart(mesh, spacing))
+}
+
+fn has_long_edges(mesh: &Mesh, apart: &FaceVec<f64>) -> bool {
+    let c = &mesh.connectivity;
+    let mut halfedges = c.halfedges();
+    halfedges.any(|h| mesh.edge_length(c.edge(h)) > 2.0 * apart[c.face(h)])
 }
 
 /// See the module docs.
 pub(crate) fn refined(mesh: Mesh, spacing: f64) -> Mesh {
-    if !is_coarse(&mesh, spacing) {
+    let apart = apart(&mesh, spacing);
+    if !has_long_edges(&mesh, &apart) {
         return mesh;
     }
-    let apart = apart(&mesh, spacing);
-    let is_long = |length: f64| length > 2.0 * apart;
-    let mut places = Places::new(apart);
+    let mut places = Places::new(apart.iter().fold(0.0, |most: f64, &x| most.max(x)));
     for &p in mesh.positions.as_slice() {
         places.take(p, None);
     }
@@ -56,10 +69,14 @@ pub(crate) fn refined(mesh: Mesh, spacing: f64) -> Mesh {
         let [a, b] = fine.connectivity.edge_vertices(e);
         distance(fine.position[a], fine.position[b]) as f32
     };
+    let apart = |fine: &Subdivision, e: EdgeId| {
+        let beside = faces(fine, e).map(|f| apart[fine.parent[f]]);
+        beside.fold(f64::INFINITY, f64::min)
+    };
     let mut longest = BinaryHeap::new();
     let push = |longest: &mut BinaryHeap<_>, fine: &Subdivision, e: EdgeId| {
         let length = length(fine, e);
-        if is_long(f64::from(length)) {
+        if f64::from(length) > 2.0 * apart(fine, e) {
             longest.push((length.to_bits(), Reverse(e)));
         }
     };
@@ -67,17 +84,18 @@ pub(crate) fn refined(mesh: Mesh, spacing: f64) -> Mesh {
         push(&mut longest, &fine, e);
     }
     // Discs around them, as dense as discs are at most. On needles, which have no room for discs, there would be more.
-    let mut left = (2.0 / (3.0_f64.sqrt() * spacing)) as usize;
+    let mut left = (2.0 / (3.0_f64.sqrt() * CLOSER * CLOSER * spacing)) as usize;
     while left > 0
         && let Some((bits, Reverse(e))) = longest.pop()
     {
         if bits != length(&fine, e).to_bits() {
             continue;
         }
-        let normal = normal(&fine, e);
+        let (normal, apart) = (normal(&fine, e), apart(&fine, e));
         let [a, b] = fine.connectivity.edge_vertices(e).map(|v| fine.position[v]);
         let at = |t: f64| std::array::from_fn(|i| (1.0 - t) * a[i] + t * b[i]);
-        let Some(part) = PARTS.into_iter().find(|&t| places.is_free(at(t), normal)) else {
+        let is_free = |&t: &f64| places.is_free(at(t), normal, apart);
+        let Some(part) = PARTS.into_iter().find(is_free) else {
             continue;
         };
         left -= 1;
@@ -92,17 +110,22 @@ pub(crate) fn refined(mesh: Mesh, spacing: f64) -> Mesh {
     lift_mesh(mesh, &fine)
 }
 
-/// Sum of the normals of an edge's faces, by their areas.
-fn normal(fine: &Subdivision, e: EdgeId) -> [f64; 3] {
+/// One or two.
+fn faces(fine: &Subdivision, e: EdgeId) -> impl Iterator<Item = FaceId> {
     let c = &fine.connectivity;
     let h = c.edge_halfedge(e);
-    let mut sum = [0.0; 3];
-    for f in [Some(h), c.twin(h)]
+    [Some(h), c.twin(h)]
         .into_iter()
         .flatten()
         .map(|h| c.face(h))
-    {
-        let [p, q, r] = c.face_vertices(f).map(|v| fine.position[v]);
+}
+
+/// Sum of the normals of an edge's faces, by their areas.
+fn normal(fine: &Subdivision, e: EdgeId) -> [f64; 3] {
+    let mut sum = [0.0; 3];
+    for f in faces(fine, e) {
+        let vertices = fine.connectivity.face_vertices(f);
+        let [p, q, r] = vertices.map(|v| fine.position[v]);
         let normal = cross(sub(q, p), sub(r, p));
         (0..3).for_each(|i| sum[i] += normal[i]);
     }
@@ -114,21 +137,22 @@ type Place = ([f64; 3], Option<[f64; 3]>);
 
 /// Points in space that others keep their distance from.
 struct Places {
-    apart: f64,
-    /// By cubes whose sides are that distance.
+    /// Side of the cubes: the greatest distance that is asked for.
+    side: f64,
+    /// By cubes.
     taken: FxHashMap<[i64; 3], Vec<Place>>,
 }
 
 impl Places {
-    fn new(apart: f64) -> Self {
+    fn new(side: f64) -> Self {
         Self {
-            apart,
+            side,
             taken: FxHashMap::default(),
         }
     }
 
     fn cube(&self, p: [f64; 3]) -> [i64; 3] {
-        p.map(|x| (x / self.apart).floor() as i64)
+        p.map(|x| (x / self.side).floor() as i64)
     }
 
     fn take(&mut self, p: [f64; 3], normal: Option<[f64; 3]>) {
@@ -139,14 +163,14 @@ impl Places {
     }
 
     /// No point is near, but new ones on the other side of something thin.
-    fn is_free(&self, p: [f64; 3], normal: [f64; 3]) -> bool {
+    fn is_free(&self, p: [f64; 3], normal: [f64; 3], apart: f64) -> bool {
         let [x, y, z] = self.cube(p);
         let around = |x: i64| x.saturating_sub(1)..=x.saturating_add(1);
         let cubes =
             around(x).flat_map(|x| around(y).flat_map(move |y| around(z).map(move |z| [x, y, z])));
         let mut near = cubes.filter_map(|cube| self.taken.get(&cube)).flatten();
         near.all(|&(q, other)| {
-            distance(p, q) >= self.apart || other.is_some_and(|n| dot(n, normal) < 0.0)
+            distance(p, q) >= apart || other.is_some_and(|n| dot(n, normal) < 0.0)
         })
     }
 }
@@ -168,9 +192,9 @@ mod tests {
             .sum::<f64>()
     }
 
-    /// Refines; checks what is guaranteed, and returns the surface and the least distance of new vertices.
+    /// Refines; checks what is guaranteed, and returns the surface and the least distance of new vertices where cones are needed.
     fn checked(mesh: &Mesh) -> (Mesh, f64) {
-        let apart = (SPACING * area(mesh)).sqrt();
+        let apart = CLOSER * (SPACING * area(mesh)).sqrt();
         let fine = refined(mesh.clone(), SPACING);
         assert!((area(&fine) - area(mesh)).abs() < 1e-12 * area(mesh));
         let (old, new) = (mesh.positions.as_slice(), fine.positions.as_slice());
@@ -190,7 +214,8 @@ mod tests {
         let (fine, apart) = checked(&polycube([[0, 0, 0]], |_, _, _| true));
         let c = &fine.connectivity;
         let longest = c.edges().map(|e| fine.edge_length(e)).fold(0.0, f64::max);
-        assert!(longest < 3.0 * apart, "{longest} of {apart}");
+        // No face of a cube needs a cone.
+        assert!(longest < 6.0 * apart, "{longest} of {apart}");
         assert!(
             (150..400).contains(&c.vertex_count()),
             "{}",

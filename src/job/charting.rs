@@ -62,6 +62,7 @@ pub(super) fn chart(
         Domain::Grid if requests.features.is_empty() => grid::refined(mesh, spacing),
         _ => mesh,
     };
+    let before = mesh.positions.len();
     let prescription = prescribed(&mesh, requests, config)?;
     let Flattened {
         mesh,
@@ -73,7 +74,7 @@ pub(super) fn chart(
         connectivity_repair,
     } = flatten(mesh, prescription, config, observer, enter)?;
     if config.domain() == Domain::Grid {
-        grid::check_size(given.len(), mesh.positions.len())?;
+        grid::check_size(before, mesh.positions.len())?;
     }
     let c = &mesh.connectivity;
     enter("charts")?;
