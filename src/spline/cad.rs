@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// Halvings towards irregular points, at most.
-pub const MOST_HALVINGS: u32 = 14;
+pub const MOST_HALVINGS: u32 = 16;
 /// With less the last square of a block of one cell would be all of it.
 const LEAST_HALVINGS: u32 = 1;
 /// Normals at the last quarter of irregular points may differ by so many times as much.
