@@ -179,3 +179,13 @@ pub enum GridError {
     #[error(transparent)]
     Solve(#[from] SolveError),
 }
+
+impl GridError {
+    /// Whether it may come of rounding in thin faces, which other triangles may be without.
+    pub(crate) fn is_of_thin_faces(&self) -> bool {
+        matches!(
+            self,
+            Self::NoTriangle { .. } | Self::Lost { .. } | Self::NoQuarterTurn { .. }
+        )
+    }
+}

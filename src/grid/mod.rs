@@ -39,7 +39,7 @@ mod walk;
 pub use distortion::Distortion;
 pub use error::GridError;
 pub use params::{Density, GridParams, MOST_CELLS};
-pub(crate) use refine::{is_coarse, refined, spacings};
+pub(crate) use refine::{Spacing, is_coarse, refined, spacings};
 
 use crate::atlas::charted::{self, Charted};
 use crate::atlas::geometry_image::GeometryImage;
@@ -205,8 +205,10 @@ struct Flattened<'a> {
 /// Parts of the number of cells that are asked for in turn, where faces are turned over or lines are lost: other whole numbers leave them other room.
 const TARGETS: [f64; 3] = [1.05, 0.95, 1.1];
 
-/// Part of the area that may be squeezed. Of other surfaces it is below 0.02, of noise 0.4.
+/// Part of the area that may be squeezed. It is 0.4 of noise, of other surfaces below 0.02, …
 const MOST_SQUEEZED: f64 = 0.1;
+/// … but any of parts of a file that get fewer cells than their shape asks for.
+const FEW_CELLS: f64 = 200.0;
 
 /// The grid of about so many cells.
 fn of_cells(
@@ -267,7 +269,7 @@ fn of_cells(
     let unit = Units::new(mesh, cell_size, params.density)?;
     drop(part);
     let relaxed = relax::relax(&mut map, &unit)?;
-    if relaxed.squeezed > MOST_SQUEEZED {
+    if wanted > FEW_CELLS && relaxed.squeezed > MOST_SQUEEZED {
         return Err(GridError::Rough {
             squeezed: relaxed.squeezed,
             most: MOST_SQUEEZED,

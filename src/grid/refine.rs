@@ -15,35 +15,51 @@ use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// The squares of the least distances between new vertices, in parts of the surface's area, for a number of cells: of a first attempt, and of others where float64 does not hold what comes
-/// of the first; with the last a mesh stays as it is.
-pub(crate) fn spacings(cells: usize) -> [f64; 4] {
-    // About two cells, but for small parts of a file and for very fine grids.
-    let vertices = (cells as f64 / 5.0).clamp(100.0, 400.0);
-    [1.0, 0.25, 4.0, f64::INFINITY].map(|factor| factor / vertices)
+/// The squares of the least distances between new vertices, in parts of the surface's area.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Spacing {
+    /// Where cones are needed.
+    needed: f64,
+    elsewhere: f64,
 }
 
-/// That distance where cones are needed, in parts of that elsewhere.
-const CLOSER: f64 = 0.5;
+/// Those of a first attempt, for a number of cells, and of others where float64 does not hold what comes of the first: as wide everywhere, as close, wider; with the last a mesh stays as it is.
+pub(crate) fn spacings(cells: usize) -> Vec<Spacing> {
+    // About a cell and two cells, but for small parts of a file and for very fine grids.
+    let of = |cells: f64, most| 1.0 / cells.clamp(100.0, most);
+    let close = of(0.8 * cells as f64, 1600.0);
+    let wide = of(0.2 * cells as f64, 400.0);
+    let all = [
+        [close, wide],
+        [wide; 2],
+        [0.25 * wide; 2],
+        [4.0 * wide; 2],
+        [f64::INFINITY; 2],
+    ];
+    let mut all = all
+        .map(|[needed, elsewhere]| Spacing { needed, elsewhere })
+        .to_vec();
+    all.dedup();
+    all
+}
 
 /// Where an edge may be split, one after another. Not in halves, where texels of a cell lie, too: these would be on edges of faces, which say little of them.
 const PARTS: [f64; 4] = [0.47, 0.53, 0.38, 0.62];
 
 /// The least distance between new vertices, by faces; edges of more than twice that are long.
-fn apart(mesh: &Mesh, spacing: f64) -> FaceVec<f64> {
+fn apart(mesh: &Mesh, spacing: Spacing) -> FaceVec<f64> {
     let faces = mesh.connectivity.faces();
     let area: f64 = faces.map(|f| triangle_area(mesh.face_positions(f))).sum();
-    let apart = (spacing * area).sqrt();
     let need = need_cones(mesh);
     let of_face = need.iter().map(|need| match need {
-        true => CLOSER * apart,
-        false => apart,
+        true => (spacing.needed * area).sqrt(),
+        false => (spacing.elsewhere * area).sqrt(),
     });
     of_face.collect()
 }
 
 /// Whether a mesh has long edges.
-pub(crate) fn is_coarse(mesh: &Mesh, spacing: f64) -> bool {
+pub(crate) fn is_coarse(mesh: &Mesh, spacing: Spacing) -> bool {
     has_long_edges(mesh, &apart(mesh, spacing))
 }
 
@@ -54,7 +70,7 @@ fn has_long_edges(mesh: &Mesh, apart: &FaceVec<f64>) -> bool {
 }
 
 /// See the module docs.
-pub(crate) fn refined(mesh: Mesh, spacing: f64) -> Mesh {
+pub(crate) fn refined(mesh: Mesh, spacing: Spacing) -> Mesh {
     let apart = apart(&mesh, spacing);
     if !has_long_edges(&mesh, &apart) {
         return mesh;
@@ -84,7 +100,7 @@ pub(crate) fn refined(mesh: Mesh, spacing: f64) -> Mesh {
         push(&mut longest, &fine, e);
     }
     // Discs around them, as dense as discs are at most. On needles, which have no room for discs, there would be more.
-    let mut left = (2.0 / (3.0_f64.sqrt() * CLOSER * CLOSER * spacing)) as usize;
+    let mut left = (2.0 / (3.0_f64.sqrt() * spacing.needed)) as usize;
     while left > 0
         && let Some((bits, Reverse(e))) = longest.pop()
     {
@@ -183,7 +199,10 @@ mod tests {
     use crate::repair::{RepairParams, repair};
     use std::f64::consts::TAU;
 
-    const SPACING: f64 = 1.0 / 400.0;
+    const SPACING: Spacing = Spacing {
+        needed: 1.0 / 1600.0,
+        elsewhere: 1.0 / 400.0,
+    };
 
     fn area(mesh: &Mesh) -> f64 {
         let faces = mesh.connectivity.faces();
@@ -194,7 +213,7 @@ mod tests {
 
     /// Refines; checks what is guaranteed, and returns the surface and the least distance of new vertices where cones are needed.
     fn checked(mesh: &Mesh) -> (Mesh, f64) {
-        let apart = CLOSER * (SPACING * area(mesh)).sqrt();
+        let apart = (SPACING.needed * area(mesh)).sqrt();
         let fine = refined(mesh.clone(), SPACING);
         assert!((area(&fine) - area(mesh)).abs() < 1e-12 * area(mesh));
         let (old, new) = (mesh.positions.as_slice(), fine.positions.as_slice());

@@ -14,7 +14,7 @@ use crate::flow::refine::ConnectivityRepair;
 use crate::geometry::frame::Frame;
 use crate::geometry::ids::VertexVec;
 use crate::geometry::mesh::Mesh;
-use crate::grid;
+use crate::grid::{self, Spacing};
 use crate::observe::Observer;
 use crate::repair::{Component, RepairLog};
 
@@ -45,7 +45,7 @@ pub(super) fn chart(
     component: Component,
     requests: &Requests,
     config: &Config,
-    spacing: f64,
+    spacing: Spacing,
     observer: &dyn Observer,
     enter: &impl Fn(&'static str) -> Result<(), BuildError>,
 ) -> Result<Charting, BuildError> {

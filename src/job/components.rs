@@ -8,7 +8,7 @@ use crate::atlas::patch::Domain;
 use crate::config::Config;
 use crate::flow::cones::{self, Requests};
 use crate::geometry::mesh::{Mesh, Soup};
-use crate::grid::{self, GridError};
+use crate::grid::{self, Spacing};
 use crate::observe::Observer;
 use crate::parallel;
 use crate::product::AffineAtlas;
@@ -58,11 +58,12 @@ impl Part<'_> {
         let mut atlas = self.built(&self.requests, &self.config, self.spacings()[0], None);
         for spacing in self.other_spacings() {
             // Other triangles may do. What else is wrong with a grid stays so.
-            let Err(BuildError::Grid(GridError::NoTriangle { .. } | GridError::Lost { .. })) =
-                atlas
-            else {
+            let Err(BuildError::Grid(error)) = &atlas else {
                 break;
             };
+            if !error.is_of_thin_faces() {
+                break;
+            }
             atlas = self.built(&self.requests, &self.config, spacing, None);
         }
         match atlas {
@@ -78,27 +79,30 @@ impl Part<'_> {
     }
 
     /// Those of new vertices, at first and where that fails.
-    fn spacings(&self) -> [f64; 4] {
+    fn spacings(&self) -> Vec<Spacing> {
         grid::spacings(self.config.grid.cells)
     }
 
     /// Spacings other than the first with which the mesh becomes another one.
-    fn other_spacings(&self) -> Vec<f64> {
-        let [first, finer, others @ ..] = self.spacings();
-        let is_coarse = |spacing| {
-            let mesh = self.component.mesh.as_ref();
-            // Of a mesh with many vertices others change little.
-            let few = |mesh: &&Mesh| mesh.connectivity.face_count() <= FEW;
-            mesh.ok()
-                .filter(few)
-                .is_some_and(|mesh| grid::is_coarse(mesh, spacing))
+    fn other_spacings(&self) -> Vec<Spacing> {
+        let mesh = self.component.mesh.as_ref();
+        // Of a mesh with many vertices others change little.
+        let few = |mesh: &&Mesh| mesh.connectivity.face_count() <= FEW;
+        let Some(mesh) = mesh.ok().filter(few) else {
+            return Vec::new();
         };
-        let others = others.into_iter().filter(|_| is_coarse(first));
-        let finer = is_coarse(finer).then_some(finer);
-        finer.into_iter().chain(others).collect()
+        let mut spacings = self.spacings();
+        let mut sizes = Vec::new();
+        spacings.retain(|&spacing| {
+            let size = grid::refined(mesh.clone(), spacing).positions.len();
+            let is_new = !sizes.contains(&size);
+            sizes.push(size);
+            is_new
+        });
+        spacings.split_off(1)
     }
 
-    /// Builds it on other grids, one after the other: with more vertices, whose triangles are less thin, with fewer, and with its own; then with more cells, whose lines leave no slivers where those
+    /// Builds it on other grids, one after the other: with fewer vertices, with more, whose triangles are less thin, and with its own; then with more cells, whose lines leave no slivers where those
     /// of fewer did, and without sharp edges as lines.
     pub fn on_other_grids(&self) -> impl Iterator<Item = Result<AffineAtlas, BuildError>> {
         let (mut more, mut smooth) = (self.config.clone(), self.config.clone());
@@ -121,7 +125,7 @@ impl Part<'_> {
         &self,
         requests: &Requests,
         config: &Config,
-        spacing: f64,
+        spacing: Spacing,
         no_grid: Option<String>,
     ) -> Result<AffineAtlas, BuildError> {
         let component = self.component.clone();

@@ -8,7 +8,7 @@ use crate::atlas::{geometry_image, patches};
 use crate::config::Config;
 use crate::flow::cones::Requests;
 use crate::geometry::deviation::Triangles;
-use crate::grid;
+use crate::grid::{self, Spacing};
 use crate::observe::{Observer, part};
 use crate::product::AffineAtlas;
 use crate::rebuild::Images;
@@ -21,7 +21,7 @@ pub(super) fn pipeline(
     component: Component,
     requests: &Requests,
     config: &Config,
-    spacing: f64,
+    spacing: Spacing,
     no_grid: Option<String>,
     observer: &dyn Observer,
     enter: &impl Fn(&'static str) -> Result<(), BuildError>,

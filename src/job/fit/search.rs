@@ -4,7 +4,7 @@ use super::{FitAssetError, FitParams, Size, of_spline};
 use crate::config::{self, Config};
 use crate::export::folder::component_name;
 use crate::flow::cones;
-use crate::grid::{self, GridError, MOST_CELLS};
+use crate::grid::{self, GridError, MOST_CELLS, Spacing};
 use crate::job::charting::{Charting, chart};
 use crate::job::{BuildError, shares};
 use crate::read;
@@ -48,7 +48,7 @@ pub(super) fn of_mesh(
             _ => component_name(index),
         };
         let config = shares::of_share(&config, share).map_err(BuildError::from)?;
-        let fitted = |component: Component, spacing: f64| {
+        let fitted = |component: Component, spacing: Spacing| {
             let charting = chart(component, &requests, &config, spacing, &(), &|_| Ok(()))?;
             match params.size {
                 Size::Default | Size::Cells(_) => one(&charting, &config, &name, config.grid.cells),
@@ -56,12 +56,15 @@ pub(super) fn of_mesh(
                 Size::Length(length) => coarsest(&charting, &config, &name, |d| length / d),
             }
         };
-        let [first, finer, ..] = grid::spacings(config.grid.cells);
+        let spacings = grid::spacings(config.grid.cells);
         let mesh = component.mesh.as_ref();
-        let is_coarse = mesh.is_ok_and(|mesh| grid::is_coarse(mesh, finer));
-        let mut spline = fitted(component.clone(), first);
-        if is_coarse && matches!(spline, Err(FitAssetError::Grid { .. })) {
-            spline = fitted(component, finer);
+        let is_coarse = mesh.is_ok_and(|mesh| grid::is_coarse(mesh, spacings[0]));
+        let mut spline = fitted(component.clone(), spacings[0]);
+        for &spacing in spacings[1..].iter().filter(|_| is_coarse) {
+            if !matches!(spline, Err(FitAssetError::Grid { .. })) {
+                break;
+            }
+            spline = fitted(component.clone(), spacing);
         }
         splines.push((name.clone(), spline?));
     }
