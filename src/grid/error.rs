@@ -139,7 +139,7 @@ pub enum GridError {
         /// A square there.
         square: u32,
     },
-    /// Most of the surface is too rough for its cells.
+    /// Too much of the surface is too rough for its cells.
     #[error(
         "cells would be stretched more than sevenfold on {:.0} % of the surface's area, and a grid has at most {:.0} %: the surface is rougher than its cells: smooth it, or ask for more cells (grid.cells)", 100.0 * squeezed, 100.0 * most
     )]

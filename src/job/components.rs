@@ -55,16 +55,17 @@ pub(super) struct Part<'a> {
 impl Part<'_> {
     /// Its atlas, of flat patches where a grid cannot be made.
     pub fn atlas(&self) -> Result<AffineAtlas, BuildError> {
-        let mut atlas = self.built(&self.requests, &self.config, self.spacings()[0], None);
-        for spacing in self.other_spacings() {
-            // Other triangles may do. What else is wrong with a grid stays so.
-            let Err(BuildError::Grid(error)) = &atlas else {
-                break;
-            };
-            if !error.is_of_thin_faces() {
-                break;
+        let spaced = |spacing| self.built(&self.requests, &self.config, spacing, None);
+        // Other triangles may do. What else is wrong with a grid stays so.
+        let may_do = |atlas: &Result<_, BuildError>| matches!(atlas, Err(BuildError::Grid(error)) if error.is_of_thin_faces());
+        let mut atlas = spaced(self.spacings()[0]);
+        if may_do(&atlas) {
+            for spacing in self.other_spacings() {
+                atlas = spaced(spacing);
+                if !may_do(&atlas) {
+                    break;
+                }
             }
-            atlas = self.built(&self.requests, &self.config, spacing, None);
         }
         match atlas {
             Err(error)

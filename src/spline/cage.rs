@@ -217,13 +217,13 @@ impl Cage {
             .collect()
     }
 
-    /// Whether a point is one where two creases turn around a single cell with no more than two on the other side.
-    pub fn turns_around_cells(&self) -> Vec<bool> {
+    /// Whether a point is one where creases turn so far that a smooth curve does not: around a single cell, which would have no area there, or on the border around four or more.
+    pub fn turns(&self) -> Vec<bool> {
         let creases = self.creases();
         let of = |(v, side): (usize, Option<CellSide>)| {
             side.filter(|_| creases[v] == 2).is_some_and(|side| {
                 let sectors = self.sectors(side);
-                sectors.contains(&1) && sectors.iter().all(|&cells| cells < 3)
+                sectors.contains(&1) || (sectors.len() == 1 && sectors[0] > 3)
             })
         };
         self.leaving().into_iter().enumerate().map(of).collect()

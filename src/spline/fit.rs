@@ -3,7 +3,7 @@
 //! *Enters:* a control mesh and samples with their places. *Leaves:* control points, and the samples at the places nearest to them. Σ area · |surface − sample|² and a little of the squares of second differences of control points are minimised
 //! by one sparse Cholesky factorisation; then places are moved to the nearest points of that surface, and so on (M. Halstead, M. Kass, T. DeRose 1993 for limit positions; J. Hoschek 1988 for places). *Guaranteed:* the same bytes for any number of threads.
 
-use super::cage::{Cage, Kind};
+use super::cage::{Cage, CellSide, Kind};
 use super::error::SplineError;
 use super::evaluator::Evaluator;
 use super::gridded::Sample;
@@ -13,6 +13,7 @@ use crate::flow::solve::SymmetricSolver;
 use crate::geometry::mesh::{norm, sub};
 use crate::parallel;
 use rayon::prelude::*;
+use std::f64::consts::PI;
 
 /// Weight of squares of second differences beside those of distances.
 const FAIR: f64 = 1e-6;
@@ -22,8 +23,9 @@ const ROUNDS: usize = 6;
 const FAR: f64 = 4.0;
 /// … and none more often than this.
 const MOST_WEIGHT: f64 = 8.0;
-/// Where the surface folds it is made fairer by this factor, after the last round so many times at most.
+/// Where the surface folds it is made fairer by this factor, up to so much: by then it is as important as distances. After the last round it is so many times at most.
 const FAIRER: f64 = 30.0;
+const FAIREST: f64 = 8.1e5;
 const MOST_SMOOTHINGS: usize = 8;
 /// Samples that are moved in one go.
 const RUN: usize = 256;
@@ -165,16 +167,14 @@ impl<'a> Fitter<'a> {
             };
             points.iter().for_each(|&v| is_near[v as usize] = true);
         }
-        let near = self
-            .fairness
-            .iter_mut()
-            .zip(&is_near)
-            .filter(|(_, near)| **near);
-        near.for_each(|(fairness, _)| *fairness *= FAIRER);
+        let near = self.fairness.iter_mut().zip(&is_near);
+        for (fairness, _) in near.filter(|(_, near)| **near) {
+            *fairness = (*fairness * FAIRER).min(FAIREST);
+        }
     }
 
     /// Fits, and moves the places of samples to the nearest points, in turn; samples that are far off count more in later rounds. Where a cell folds, samples stay where the map has them, and
-    /// where it still does it is made fairer.
+    /// where it still does it is made fairer. What folds in the end all the same is left as it was after the last correction of places: more fairness moved it away from the samples for nothing.
     ///
     /// # Errors
     /// Equations without solution.
@@ -182,18 +182,21 @@ impl<'a> Fitter<'a> {
         let given: Vec<Place> = samples.iter().map(Sample::place).collect();
         let mut folds = vec![0usize; self.cage.cells.len()];
         let mut control = self.solve(samples)?;
+        let mut folding = None;
         for round in 1..=ROUNDS + MOST_SMOOTHINGS {
             let limit = Limit::new(self.cage, self.evaluator, &control);
             let mut moved = samples.to_vec();
             move_places(&limit, &mut moved);
             let folded = match round {
                 1 => Vec::new(),
-                _ => shape(&limit, &moved).1,
+                _ => shape(&limit).1,
             };
-            let is_last = round >= ROUNDS && folded.is_empty();
-            if is_last || round == ROUNDS + MOST_SMOOTHINGS {
-                samples.copy_from_slice(&moved);
-                break;
+            if round >= ROUNDS {
+                if folded.is_empty() {
+                    samples.copy_from_slice(&moved);
+                    return Ok(control);
+                }
+                folding.get_or_insert_with(|| (control.clone(), moved.clone()));
             }
             folded.iter().for_each(|&cell| folds[cell as usize] += 1);
             if round < ROUNDS {
@@ -201,16 +204,18 @@ impl<'a> Fitter<'a> {
                 weigh(&limit, samples);
             }
             for (sample, place) in samples.iter_mut().zip(&given) {
-                if [place.cell, sample.cell]
-                    .iter()
-                    .any(|&cell| folds[cell as usize] > 0)
-                {
+                let is_folded = |cell: u32| folds[cell as usize] > 0;
+                if is_folded(place.cell) || is_folded(sample.cell) {
                     (sample.cell, sample.at, sample.weight) = (place.cell, place.at, 1.0);
                 }
             }
             let again = folded.into_iter().filter(|&cell| folds[cell as usize] > 1);
             self.smooth(&again.collect::<Vec<u32>>(), round > ROUNDS + 1);
             control = self.solve(samples)?;
+        }
+        if let Some((folding, places)) = folding {
+            samples.copy_from_slice(&places);
+            control = folding;
         }
         Ok(control)
     }
@@ -242,7 +247,7 @@ pub fn move_places(limit: &Limit<'_>, samples: &mut [Sample]) {
     });
 }
 
-/// Second differences along both lines through a regular point, along a crease, and from the mean of the neighbours of an irregular point.
+/// Second differences along both lines through a regular point, along creases, and along lines through points with three cells or more between two creases; and how far the edges at an irregular point are from flat.
 fn differences(cage: &Cage) -> Vec<Difference> {
     let kinds = cage.kinds();
     let mut all = Vec::new();
@@ -261,28 +266,64 @@ fn differences(cage: &Cage) -> Vec<Difference> {
                 all.push(second(end(&star[1]), end(&star[3])));
             }
             Kind::Smooth | Kind::Dart => {
-                let part = 1.0 / star.len() as f64;
-                let mut points: Vec<(u32, f64)> = star.iter().map(|s| (end(s), part)).collect();
-                points.push((at, -1.0));
-                all.push(Difference { points, at });
+                let ends: Vec<u32> = star.iter().map(end).collect();
+                all.extend(from_flat(at, &ends));
             }
-            Kind::Crease => {
-                let mut ends: Vec<u32> = star
+            kind => {
+                let least = if kind == Kind::Crease { 3 } else { 4 };
+                let sectors = sectors(cage, &star);
+                let mut lines: Vec<[u32; 2]> = sectors
                     .iter()
-                    .filter(|&&s| cage.is_crease(s))
-                    .map(end)
+                    .filter(|ends| ends.len() >= least)
+                    .flat_map(|ends| ends.iter().zip(&ends[2..]))
+                    .map(|(&a, &b)| [a.min(b), a.max(b)])
                     .collect();
-                if let Some(&(c, k)) = star
-                    .last()
-                    .filter(|&&(c, k)| cage.across[c as usize][usize::from((k + 3) & 3)].is_none())
-                {
-                    ends.push(cage.cells[c as usize][usize::from((k + 3) & 3)]);
-                }
-                if let [a, b] = ends[..] {
-                    all.push(second(a, b));
-                }
+                lines.sort_unstable();
+                lines.dedup();
+                all.extend(lines.into_iter().map(|[a, b]| second(a, b)));
             }
-            Kind::Corner => {}
+        }
+    }
+    all
+}
+
+/// Of the cells between two creases around a point, the ends of the edges that leave it, creases first and last.
+fn sectors(cage: &Cage, star: &[CellSide]) -> Vec<Vec<u32>> {
+    let mut star = star.to_vec();
+    let first = star.iter().position(|&s| cage.is_crease(s));
+    star.rotate_left(first.unwrap_or(0));
+    let mut sectors: Vec<Vec<u32>> = Vec::new();
+    for &(c, k) in &star {
+        let corners = cage.cells[c as usize];
+        let end = |k: u8| corners[usize::from(k & 3)];
+        if cage.is_crease((c, k)) || sectors.is_empty() {
+            sectors.push(vec![end(k + 1)]);
+        }
+        if let Some(sector) = sectors.last_mut() {
+            sector.push(end(k + 3));
+        }
+    }
+    sectors
+}
+
+/// How far edges that leave a point are from those of a regular polygon after an affine map: waves around it but those that turn once. With four edges their squares add up to those of both second differences.
+fn from_flat(at: u32, ends: &[u32]) -> Vec<Difference> {
+    let n = ends.len();
+    let wave = |k: usize, shift: f64| {
+        let turn = 2.0 * PI * k as f64 / n as f64;
+        // Sums of squares of a constant and of an alternating wave are twice those of others.
+        let size = if (2 * k).is_multiple_of(n) { 2.0 } else { 4.0 };
+        let weight = |i: usize| (size / n as f64).sqrt() * (turn * i as f64 - shift).cos();
+        let weights: Vec<f64> = (0..n).map(weight).collect();
+        let mut points: Vec<(u32, f64)> = ends.iter().copied().zip(weights.clone()).collect();
+        points.push((at, -weights.iter().sum::<f64>()));
+        Difference { points, at }
+    };
+    let mut all = vec![wave(0, 0.0)];
+    for k in 2..=n / 2 {
+        all.push(wave(k, 0.0));
+        if 2 * k < n {
+            all.push(wave(k, PI / 2.0));
         }
     }
     all

@@ -187,7 +187,7 @@ impl Gridded {
             let found = cage(&|ends| edges.contains(&ends), none())?;
             let untidy = found.untidy_creases();
             if untidy.is_empty() {
-                let is_corner = found.turns_around_cells();
+                let is_corner = found.turns();
                 return cage(&|ends| edges.contains(&ends), is_corner);
             }
             for side in untidy {

@@ -24,15 +24,17 @@ pub struct Errors {
 /// Whether the surface is one everywhere.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Shape {
-    /// Smallest |∂s × ∂t| over its mean, over the middles of [`PARTS`]² parts of every cell.
+    /// Smallest |∂s × ∂t| over its mean, over places an eighth of a cell apart, closer to each other beside irregular points.
     pub least_jacobian: f64,
-    /// Part of the area where the surface is folded over itself: in a cell where the normal turns by more than a right angle from one part to the next, the parts whose normal looks away from
-    /// the mean one, if they are a twentieth of the cell more than those of the source that do.
+    /// Part of the area beside places where the surface is folded, or bent as much as if it were: from one place to the next, an eighth of a cell away or less, the normal turns by a right angle or more.
     pub turned_over: f64,
 }
 
-/// Parts of a cell along a side.
-pub const PARTS: usize = 8;
+/// Places are an eighth of a cell apart along both sides …
+/// … and beside irregular points closer: eight for every halving, down to so many.
+const HALVINGS: i32 = 6;
+/// Places on sides are inside by this part of a cell: on a crease, or at its end, there is no normal.
+const INSIDE: f64 = 1e-6;
 
 /// Measures samples that were moved to the nearest places.
 pub fn errors(limit: &Limit<'_>, samples: &[Sample]) -> Errors {
@@ -65,86 +67,83 @@ pub fn errors(limit: &Limit<'_>, samples: &[Sample]) -> Errors {
     }
 }
 
-/// Jacobians in the middles of the parts of a cell, row by row.
-fn jacobians(limit: &Limit<'_>, cell: u32) -> Vec<[f64; 3]> {
-    let middle = |i: usize| (i as f64 + 0.5) / PARTS as f64;
-    let parts = (0..PARTS).flat_map(|j| (0..PARTS).map(move |i| [middle(i), middle(j)]));
-    let of = |at| {
-        let jet = limit.at(cell, at);
-        cross(jet.tangent[0], jet.tangent[1])
-    };
-    parts.map(of).collect()
+/// Places along a side of a cell, finer towards its ends where these are irregular.
+fn places(is_irregular: [bool; 2]) -> Vec<f64> {
+    let mut breaks = vec![0.0, 0.5, 1.0];
+    let halves = (2..=HALVINGS).map(|d| 0.5f64.powi(d));
+    if is_irregular[0] {
+        breaks.extend(halves.clone());
+    }
+    if is_irregular[1] {
+        breaks.extend(halves.map(|x| 1.0 - x));
+    }
+    breaks.sort_by(f64::total_cmp);
+    let between = breaks.windows(2).flat_map(|ends| {
+        let part = (ends[1] - ends[0]) / 4.0;
+        (0..4).map(move |i| ends[0] + f64::from(i) * part)
+    });
+    let all = between.chain([1.0]);
+    all.map(|x| x.clamp(INSIDE, 1.0 - INSIDE)).collect()
 }
 
-/// Part of a cell by which more of the surface than of the source may look away from its mean normal.
-const AWAY: f64 = 0.05;
-
-/// Looks for folds, and lists the cells in which there are some. `samples`: of the source.
-pub fn shape(limit: &Limit<'_>, samples: &[Sample]) -> (Shape, Vec<u32>) {
+/// Looks for folds, and lists the cells in which there are some.
+pub fn shape(limit: &Limit<'_>) -> (Shape, Vec<u32>) {
     let cells = limit.cage.cells.len();
-    let each = parallel::map_numbers(cells, |cell| Cell::new(limit, cell as u32));
-    let mut source = vec![[0.0; 2]; each.len()];
-    for sample in samples.iter().filter(|s| each[s.cell as usize].away > 0.0) {
-        let [away, all] = &mut source[sample.cell as usize];
-        *all += sample.area;
-        if dot(sample.normal, each[sample.cell as usize].mean) < 0.0 {
-            *away += sample.area;
-        }
-    }
-    let folded = |(cell, [away, all]): &(&Cell, [f64; 2])| {
-        let bent = if *all > 0.0 { away / all } else { 0.0 };
-        cell.away > cell.area * (bent + AWAY).min(1.0)
-    };
-    let sum: f64 = each.iter().map(|cell| cell.area).sum();
-    let mean = sum / (each.len() * PARTS * PARTS) as f64;
-    let least = each
-        .iter()
-        .map(|cell| cell.least)
-        .fold(f64::INFINITY, f64::min);
-    let is_folded: Vec<bool> = each.iter().zip(source).map(|pair| folded(&pair)).collect();
-    let over = each.iter().zip(&is_folded).filter(|(_, folded)| **folded);
+    let irregular = limit.cage.irregular();
+    let each = parallel::map_numbers(cells, |cell| Cell::new(limit, cell as u32, &irregular));
+    let area: f64 = each.iter().map(|cell| cell.area).sum();
+    let over: f64 = each.iter().map(|cell| cell.over).sum();
+    let least = each.iter().map(|cell| cell.least);
     let shape = Shape {
-        least_jacobian: least / mean,
-        turned_over: over.fold(0.0, |area, (cell, _)| area + cell.away) / sum,
+        least_jacobian: least.fold(f64::INFINITY, f64::min) * cells as f64 / area,
+        turned_over: over / area,
     };
-    let folded = (0..).zip(&is_folded).filter(|(_, folded)| **folded);
+    let folded = (0..).zip(&each).filter(|(_, cell)| cell.over > 0.0);
     (shape, folded.map(|(cell, _)| cell).collect())
 }
 
 /// The Jacobians of a cell.
 struct Cell {
-    /// Sum of their lengths.
+    /// Its area.
     area: f64,
-    /// The least length.
+    /// Their least length.
     least: f64,
-    /// Their sum.
-    mean: [f64; 3],
-    /// Sum of the lengths of those that look away from it, where some neighbours are more than a right angle apart; else 0.
-    away: f64,
+    /// Area of its folded parts.
+    over: f64,
 }
 
 impl Cell {
-    fn new(limit: &Limit<'_>, cell: u32) -> Self {
-        let jacobians = jacobians(limit, cell);
-        let mut mean = [0.0; 3];
-        for j in &jacobians {
-            (0..3).for_each(|i| mean[i] += j[i]);
-        }
+    fn new(limit: &Limit<'_>, cell: u32, irregular: &[bool]) -> Self {
+        let [a, b, c, d] = limit.cage.cells[cell as usize].map(|v| irregular[v as usize]);
+        let (s, t) = (places([a || d, b || c]), places([a || b, c || d]));
+        let row = s.len();
+        let grid = t.iter().flat_map(|&t| s.iter().map(move |&s| [s, t]));
+        let jacobians: Vec<[f64; 3]> = grid
+            .map(|at| limit.at(cell, at))
+            .map(|jet| cross(jet.tangent[0], jet.tangent[1]))
+            .collect();
         let sizes: Vec<f64> = jacobians.iter().map(|&j| norm(j)).collect();
-        let at = |x: usize, y: usize| jacobians[PARTS * y + x];
-        let flips = (0..PARTS).any(|y| {
-            (0..PARTS).any(|x| {
-                let right = x + 1 < PARTS && dot(at(x, y), at(x + 1, y)) < 0.0;
-                right || (y + 1 < PARTS && dot(at(x, y), at(x, y + 1)) < 0.0)
-            })
-        });
-        let away = jacobians.iter().zip(&sizes);
-        let away = away.filter(|(j, _)| flips && dot(**j, mean) < 0.0);
+        let (mut area, mut over) = (0.0, 0.0);
+        for j in 1..t.len() {
+            for i in 1..row {
+                let last = row * j + i;
+                let around = [last - row - 1, last - row, last, last - 1];
+                let size = around.iter().map(|&at| sizes[at]).sum::<f64>() / 4.0;
+                let size = size * (s[i] - s[i - 1]) * (t[j] - t[j - 1]);
+                area += size;
+                let is_over = (0..4).any(|k| {
+                    let [one, next] = [k, (k + 1) % 4].map(|k| jacobians[around[k]]);
+                    dot(one, next) <= 0.0
+                });
+                if is_over {
+                    over += size;
+                }
+            }
+        }
         Self {
-            area: sizes.iter().sum(),
+            area,
+            over,
             least: sizes.iter().copied().fold(f64::INFINITY, f64::min),
-            away: away.fold(0.0, |sum, (_, size)| sum + size),
-            mean,
         }
     }
 }

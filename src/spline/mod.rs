@@ -130,10 +130,7 @@ pub fn fit(gridded: &Gridded) -> Result<Spline, SplineError> {
         positions: &gridded.positions,
         faces: &gridded.faces,
     };
-    let (errors, shape) = (
-        measure::errors(&limit, &samples),
-        measure::shape(&limit, &samples).0,
-    );
+    let (errors, shape) = (measure::errors(&limit, &samples), measure::shape(&limit).0);
     let deviation = deviation(source, own, SAMPLING);
     for p in &mut control {
         *p = std::array::from_fn(|i| p[i] + middle[i]);

@@ -48,7 +48,7 @@ pub struct Component {
     pub both_ways: Option<Distance>,
     /// Angle between the normals of both at nearest places.
     pub normal_deviation: NormalDeviation,
-    /// Part of the area that is folded over: 0.
+    /// Part of the area that is folded, or bent as much as if it were, by a right angle within an eighth of a cell: 0.
     pub turned_over_area: f64,
     /// Least |∂s × ∂t| over its mean.
     pub least_jacobian: f64,
