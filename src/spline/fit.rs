@@ -1,6 +1,6 @@
 //! The control points whose limit surface is nearest to samples of a surface.
 //!
-//! *Enters:* a control mesh and samples with their places. *Leaves:* control points, and the samples at the places nearest to them. Σ area · |surface − sample|² and a little of the squares of second differences of control points are minimised
+//! *Enters:* a control mesh and samples with their places. *Leaves:* control points, and the samples at the places nearest to them. Σ area · |surface − sample|² and a little of the squares by which second differences of control points differ from those of the quad mesh are minimised
 //! by one sparse Cholesky factorisation; then places are moved to the nearest points of that surface, and so on (M. Halstead, M. Kass, T. DeRose 1993 for limit positions; J. Hoschek 1988 for places). *Guaranteed:* the same bytes for any number of threads.
 
 use super::cage::{Cage, CellSide, Kind};
@@ -23,18 +23,22 @@ const ROUNDS: usize = 6;
 const FAR: f64 = 4.0;
 /// … and none more often than this.
 const MOST_WEIGHT: f64 = 8.0;
-/// Where the surface folds it is made fairer by this factor, up to so much: by then it is as important as distances. After the last round it is so many times at most.
-const FAIRER: f64 = 30.0;
+/// Where the surface folds it is made fairer by this factor, up to so much: by then it is as important as distances. After the last round it is so many times at most, first at corners of cells that fold and then at all points that these depend on.
+const FAIRER: f64 = 5.5;
 const FAIREST: f64 = 8.1e5;
-const MOST_SMOOTHINGS: usize = 8;
+const MOST_SMOOTHINGS: usize = 12;
+const NARROW_SMOOTHINGS: usize = 5;
 /// Samples that are moved in one go.
 const RUN: usize = 256;
 
-/// A sum of control points that is to be small.
+/// A sum of control points that is to be near to one of points of the quad mesh.
+#[derive(Clone)]
 struct Difference {
     points: Vec<(u32, f64)>,
     /// The point that it is about.
     at: u32,
+    /// That of the quad mesh.
+    wanted: [f64; 3],
 }
 
 /// The equations of a control mesh.
@@ -55,12 +59,21 @@ struct Block {
 }
 
 impl<'a> Fitter<'a> {
-    /// Prepares the pattern.
+    /// Prepares the pattern. `quads`: points of the quad mesh.
     ///
     /// # Errors
     /// Too little memory.
-    pub fn new(cage: &'a Cage, evaluator: &'a Evaluator) -> Result<Self, SplineError> {
-        let differences = differences(cage);
+    pub fn new(
+        cage: &'a Cage,
+        evaluator: &'a Evaluator,
+        quads: &[[f64; 3]],
+    ) -> Result<Self, SplineError> {
+        let mut differences = differences(cage);
+        for difference in &mut differences {
+            for &(v, x) in &difference.points {
+                (0..3).for_each(|i| difference.wanted[i] += x * quads[v as usize][i]);
+            }
+        }
         let mut pairs = Vec::new();
         for cell in 0..cage.cells.len() as u32 {
             let points = evaluator.points(cell);
@@ -126,6 +139,9 @@ impl<'a> Fitter<'a> {
             let points = &difference.points;
             for (i, &(a, x)) in points.iter().enumerate() {
                 diagonal[a as usize] += weight * x * x;
+                for (c, wanted) in difference.wanted.iter().enumerate() {
+                    right[c * size + a as usize] += weight * x * wanted;
+                }
                 off.extend(points[..i].iter().map(|&(_, y)| weight * x * y));
             }
         }
@@ -157,10 +173,94 @@ impl<'a> Fitter<'a> {
         block
     }
 
-    /// Makes the surface of cells fairer: at their corners, or at all points that they depend on.
-    fn smooth(&mut self, cells: &[u32], is_wide: bool) {
+    /// Fits, and moves the places of samples to the nearest points, in turn; samples that are far off count more in later rounds. Where a cell folds, samples stay where the map has them, and
+    /// where it still does it is made fairer, at first such that it becomes like the quad mesh, and where that does not do, flat. What folds in the end all the same is left as it was after the last correction of places.
+    ///
+    /// # Errors
+    /// Equations without solution.
+    pub fn fit(&mut self, samples: &mut [Sample]) -> Result<Vec<[f64; 3]>, SplineError> {
+        let mut folds = Folds {
+            given: samples.iter().map(Sample::place).collect(),
+            times: vec![0; self.cage.cells.len()],
+        };
+        for round in 1..ROUNDS {
+            let control = self.solve(samples)?;
+            let limit = Limit::new(self.cage, self.evaluator, &control);
+            move_places(&limit, samples);
+            weigh(&limit, samples);
+            if round > 1 {
+                self.make_fairer(&mut folds, &shape(&limit).1, samples, false);
+            }
+        }
+        let control = self.solve(samples)?;
+        let limit = Limit::new(self.cage, self.evaluator, &control);
+        let folded = shape(&limit).1;
+        if !folded.is_empty() {
+            let fairness = self.fairness.clone();
+            for is_flat in [false, true] {
+                self.fairness.clone_from(&fairness);
+                let mut tried = samples.to_vec();
+                let unfolded = self.unfolded(folds.clone(), &folded, &mut tried, is_flat)?;
+                if let Some(control) = unfolded {
+                    samples.copy_from_slice(&tried);
+                    return Ok(control);
+                }
+            }
+        }
+        move_places(&limit, samples);
+        Ok(control)
+    }
+
+    /// Control points with which nothing folds, and samples at their places, if fairness leads there; `is_flat`: not to the quad mesh, but to a flat one.
+    fn unfolded(
+        &mut self,
+        mut folds: Folds,
+        folded: &[u32],
+        samples: &mut [Sample],
+        is_flat: bool,
+    ) -> Result<Option<Vec<[f64; 3]>>, SplineError> {
+        let given = self.differences.clone();
+        if is_flat {
+            let wanted = self.differences.iter_mut().map(|d| &mut d.wanted);
+            wanted.for_each(|wanted| *wanted = [0.0; 3]);
+        }
+        let mut folded = folded.to_vec();
+        for smoothing in 0..MOST_SMOOTHINGS {
+            self.make_fairer(&mut folds, &folded, samples, smoothing > NARROW_SMOOTHINGS);
+            let control = self.solve(samples)?;
+            let limit = Limit::new(self.cage, self.evaluator, &control);
+            folded = shape(&limit).1;
+            if folded.is_empty() {
+                move_places(&limit, samples);
+                return Ok(Some(control));
+            }
+        }
+        self.differences = given;
+        Ok(None)
+    }
+
+    /// Puts samples of cells that fold, or did, where the map has them, and makes those fairer that folded before.
+    fn make_fairer(
+        &mut self,
+        folds: &mut Folds,
+        folded: &[u32],
+        samples: &mut [Sample],
+        is_wide: bool,
+    ) {
+        folded
+            .iter()
+            .for_each(|&cell| folds.times[cell as usize] += 1);
+        for (sample, place) in samples.iter_mut().zip(&folds.given) {
+            let has_folded = |cell: u32| folds.times[cell as usize] > 0;
+            if has_folded(place.cell) || has_folded(sample.cell) {
+                (sample.cell, sample.at, sample.weight) = (place.cell, place.at, 1.0);
+            }
+        }
+        let again = folded
+            .iter()
+            .filter(|cell| folds.times[**cell as usize] > 1);
         let mut is_near = vec![false; self.cage.vertices];
-        for &cell in cells {
+        for &cell in again {
             let points = match is_wide {
                 true => self.evaluator.points(cell),
                 false => &self.cage.cells[cell as usize],
@@ -172,53 +272,15 @@ impl<'a> Fitter<'a> {
             *fairness = (*fairness * FAIRER).min(FAIREST);
         }
     }
+}
 
-    /// Fits, and moves the places of samples to the nearest points, in turn; samples that are far off count more in later rounds. Where a cell folds, samples stay where the map has them, and
-    /// where it still does it is made fairer. What folds in the end all the same is left as it was after the last correction of places: more fairness moved it away from the samples for nothing.
-    ///
-    /// # Errors
-    /// Equations without solution.
-    pub fn fit(&mut self, samples: &mut [Sample]) -> Result<Vec<[f64; 3]>, SplineError> {
-        let given: Vec<Place> = samples.iter().map(Sample::place).collect();
-        let mut folds = vec![0usize; self.cage.cells.len()];
-        let mut control = self.solve(samples)?;
-        let mut folding = None;
-        for round in 1..=ROUNDS + MOST_SMOOTHINGS {
-            let limit = Limit::new(self.cage, self.evaluator, &control);
-            let mut moved = samples.to_vec();
-            move_places(&limit, &mut moved);
-            let folded = match round {
-                1 => Vec::new(),
-                _ => shape(&limit).1,
-            };
-            if round >= ROUNDS {
-                if folded.is_empty() {
-                    samples.copy_from_slice(&moved);
-                    return Ok(control);
-                }
-                folding.get_or_insert_with(|| (control.clone(), moved.clone()));
-            }
-            folded.iter().for_each(|&cell| folds[cell as usize] += 1);
-            if round < ROUNDS {
-                samples.copy_from_slice(&moved);
-                weigh(&limit, samples);
-            }
-            for (sample, place) in samples.iter_mut().zip(&given) {
-                let is_folded = |cell: u32| folds[cell as usize] > 0;
-                if is_folded(place.cell) || is_folded(sample.cell) {
-                    (sample.cell, sample.at, sample.weight) = (place.cell, place.at, 1.0);
-                }
-            }
-            let again = folded.into_iter().filter(|&cell| folds[cell as usize] > 1);
-            self.smooth(&again.collect::<Vec<u32>>(), round > ROUNDS + 1);
-            control = self.solve(samples)?;
-        }
-        if let Some((folding, places)) = folding {
-            samples.copy_from_slice(&places);
-            control = folding;
-        }
-        Ok(control)
-    }
+/// Where cells fold.
+#[derive(Clone)]
+struct Folds {
+    /// Of each sample, its place on the map.
+    given: Vec<Place>,
+    /// Of each cell, how many times it did.
+    times: Vec<usize>,
 }
 
 /// Weights of samples for the next fit: more where they are far off.
@@ -259,6 +321,7 @@ fn differences(cage: &Cage) -> Vec<Difference> {
         let second = |a: u32, b: u32| Difference {
             points: vec![(at, -2.0), (a, 1.0), (b, 1.0)],
             at,
+            wanted: [0.0; 3],
         };
         match kinds[v] {
             Kind::Smooth if star.len() == 4 => {
@@ -317,7 +380,11 @@ fn from_flat(at: u32, ends: &[u32]) -> Vec<Difference> {
         let weights: Vec<f64> = (0..n).map(weight).collect();
         let mut points: Vec<(u32, f64)> = ends.iter().copied().zip(weights.clone()).collect();
         points.push((at, -weights.iter().sum::<f64>()));
-        Difference { points, at }
+        Difference {
+            points,
+            at,
+            wanted: [0.0; 3],
+        }
     };
     let mut all = vec![wave(0, 0.0)];
     for k in 2..=n / 2 {

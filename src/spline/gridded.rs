@@ -99,6 +99,35 @@ impl Cells {
     }
 }
 
+/// Creases inside, as chains of points, but those that end inside and have too few edges, and those of which all that hang together have too few.
+fn long_creases(cage: &Cage) -> Vec<Vec<u32>> {
+    let mut kept = cage.chains();
+    kept.retain(|chain| {
+        let ends = [chain[0], chain[chain.len() - 1]];
+        let goes_on = ends.iter().all(|&v| cage.is_corner[v as usize]) || ends[0] == ends[1];
+        goes_on || chain.len() > SHORTEST_CREASE
+    });
+    let mut sets = UnionFind::new(cage.vertices);
+    let mut length = vec![0; cage.vertices];
+    for step in kept.iter().flat_map(|chain| chain.windows(2)) {
+        sets.join(step[0] as usize, step[1] as usize);
+    }
+    for chain in &kept {
+        length[sets.find(chain[0] as usize)] += chain.len() - 1;
+    }
+    let leaving = cage.leaving();
+    let is_on_border = |v: u32| {
+        leaving[v as usize].is_some_and(|side| cage.turn_back(cage.star(side)[0]).is_none())
+    };
+    let on_border = kept.iter().flatten().filter(|&&v| is_on_border(v));
+    let touches: FxHashSet<usize> = on_border.map(|&v| sets.find(v as usize)).collect();
+    kept.retain(|chain| {
+        let set = sets.find(chain[0] as usize);
+        length[set] >= SHORTEST_NET || touches.contains(&set)
+    });
+    kept
+}
+
 impl Gridded {
     /// Least and greatest coordinates of vertices.
     pub fn bounds(&self) -> ([f64; 3], [f64; 3]) {
@@ -149,52 +178,21 @@ impl Gridded {
             2.0 * steps.iter().map(|&s| part(&sharp, s)).sum::<f64>() >= steps.len() as f64
         });
         let mut edges: FxHashSet<[u32; 2]> = kept.iter().flat_map(|chain| steps(chain)).collect();
-        let chains = cage(&|ends| edges.contains(&ends), none())?;
-        kept = chains.chains();
-        kept.retain(|chain| {
-            let ends = [chain[0], chain[chain.len() - 1]];
-            let goes_on = ends.iter().all(|&v| chains.is_corner[v as usize]) || ends[0] == ends[1];
-            goes_on || chain.len() > SHORTEST_CREASE
-        });
-        // And what hangs together is longer than around two cells.
-        let mut sets = UnionFind::new(self.points.len());
-        kept.iter().for_each(|chain| {
-            chain.windows(2).for_each(|w| {
-                sets.join(w[0] as usize, w[1] as usize);
-            })
-        });
-        let mut length = vec![0; self.points.len()];
-        for chain in &kept {
-            length[sets.find(chain[0] as usize)] += chain.len() - 1;
-        }
-        let border = chains.leaving();
-        let is_on_border = |v: u32| {
-            border[v as usize].is_some_and(|side| chains.turn_back(chains.star(side)[0]).is_none())
-        };
-        let touches: FxHashSet<usize> = kept
-            .iter()
-            .flatten()
-            .filter(|&&v| is_on_border(v))
-            .map(|&v| sets.find(v as usize))
-            .collect();
-        kept.retain(|chain| {
-            let set = sets.find(chain[0] as usize);
-            length[set] >= SHORTEST_NET || touches.contains(&set)
-        });
-        edges = kept.iter().flat_map(|chain| steps(chain)).collect();
-        // Where the limit surface would have no tangent plane, creases end an edge before.
+        // Short ones are dropped; and where the limit surface would have no tangent plane, creases end an edge before, which makes some short.
         loop {
+            let before = edges.len();
             let found = cage(&|ends| edges.contains(&ends), none())?;
-            let untidy = found.untidy_creases();
-            if untidy.is_empty() {
-                let is_corner = found.turns();
-                return cage(&|ends| edges.contains(&ends), is_corner);
+            edges = long_creases(&found)
+                .iter()
+                .flat_map(|chain| steps(chain))
+                .collect();
+            let found = cage(&|ends| edges.contains(&ends), none())?;
+            for side in found.untidy_creases() {
+                let ends = [found.tail(side), found.tail((side.0, side.1 + 1))];
+                edges.remove(&sorted(ends));
             }
-            for side in untidy {
-                edges.remove(&sorted([
-                    found.tail(side),
-                    found.tail((side.0, side.1 + 1)),
-                ]));
+            if edges.len() == before {
+                return cage(&|ends| edges.contains(&ends), found.turns());
             }
         }
     }

@@ -119,7 +119,7 @@ pub fn fit(gridded: &Gridded) -> Result<Spline, SplineError> {
     let cage = gridded.cage()?;
     let mut samples = gridded.samples()?;
     let evaluator = Evaluator::new(&cage);
-    let mut control = Fitter::new(&cage, &evaluator)?.fit(&mut samples)?;
+    let mut control = Fitter::new(&cage, &evaluator, &gridded.points)?.fit(&mut samples)?;
     let limit = Limit::new(&cage, &evaluator, &control);
     let triangles = tessellate(&limit, parts(cage.cells.len()));
     let own = Triangles {
