@@ -21,7 +21,7 @@ use rustc_hash::FxHashMap;
 pub const MOST_HALVINGS: u32 = 16;
 /// With less the last square of a block of one cell would be all of it.
 const LEAST_HALVINGS: u32 = 1;
-/// Normals at the last quarter of irregular points may differ by so many times as much.
+/// Normals at the last eighth of irregular points may differ by so many times as much.
 const ELSEWHERE: f64 = 5.0;
 /// Places along an edge where normals of both faces are compared, a unit of cells.
 const ALONG: usize = 8;
@@ -107,7 +107,7 @@ fn face(limit: &Limit<'_>, block: &Block, irregular: [bool; 4], halvings: u32) -
     surface(limit, block, irregular, [across, up])
 }
 
-/// Halvings after which normals at three quarters of the irregular points differ by less than `angle`, radians, and at all others by less than [`ELSEWHERE`] times that; [`MOST_HALVINGS`] where there are none.
+/// Halvings after which normals at seven of eight irregular points differ by less than `angle`, radians, and at all others by less than [`ELSEWHERE`] times that; [`MOST_HALVINGS`] where there are none.
 fn halvings(limit: &Limit<'_>, irregular: &[bool], angle: f64) -> u32 {
     let (leaving, kinds) = (limit.cage.leaving(), limit.cage.kinds());
     // At corners the surface is sharp, however small the square.
@@ -134,7 +134,7 @@ fn halvings(limit: &Limit<'_>, irregular: &[bool], angle: f64) -> u32 {
     let usual = needed
         .len()
         .checked_sub(1)
-        .map(|last| needed[last * 3 / 4][0]);
+        .map(|last| needed[last * 7 / 8][0]);
     most.max(usual.unwrap_or(LEAST_HALVINGS))
 }
 

@@ -24,10 +24,10 @@ const FAR: f64 = 4.0;
 /// … and none more often than this.
 const MOST_WEIGHT: f64 = 8.0;
 /// Where the surface folds it is made fairer by this factor, up to so much: by then it is as important as distances. After the last round it is so many times at most, first at corners of cells that fold and then at all points that these depend on.
-const FAIRER: f64 = 5.5;
+const FAIRER: f64 = 3.0;
 const FAIREST: f64 = 8.1e5;
-const MOST_SMOOTHINGS: usize = 12;
-const NARROW_SMOOTHINGS: usize = 5;
+const MOST_SMOOTHINGS: usize = 18;
+const NARROW_SMOOTHINGS: usize = 8;
 /// Samples that are moved in one go.
 const RUN: usize = 256;
 
@@ -395,3 +395,7 @@ fn from_flat(at: u32, ends: &[u32]) -> Vec<Difference> {
     }
     all
 }
+
+#[cfg(test)]
+#[path = "tests/fit.rs"]
+mod tests;
