@@ -66,6 +66,16 @@ def quadriflow(source, target, cells):
     print(json.dumps({"seconds": seconds}))
 
 
+def ask_quadriflow(python, source, target, cells):
+    """Points, polygons and seconds; None where it failed."""
+    target.unlink(missing_ok=True)
+    said = subprocess.run([python, __file__, "--quadriflow", source, target, str(cells)], capture_output=True, text=True)
+    if not target.exists():
+        return None
+    lines = [line for line in said.stdout.splitlines() if line.startswith('{"seconds"')]
+    return *read_obj(target), json.loads(lines[-1])["seconds"]
+
+
 def instant(points, faces, cells):
     import pynanoinstantmeshes
 
@@ -193,13 +203,8 @@ def main(program, python, folder, cells, meshes):
         (points, polygons), seconds = ours(program, mesh, folder, cells)
         made = {"affine-atlas": (points, polygons, seconds)}
         count = len(polygons)
-        path = folder / f"{mesh.stem}.quadriflow.obj"
-        path.unlink(missing_ok=True)
-        said = subprocess.run([python, __file__, "--quadriflow", plain, path, str(count)], capture_output=True, text=True)
-        if path.exists():
-            points, polygons = read_obj(path)
-            lines = [line for line in said.stdout.splitlines() if line.startswith('{"seconds"')]
-            made["QuadriFlow"] = points, polygons, json.loads(lines[-1])["seconds"]
+        if asked := ask_quadriflow(python, plain, folder / f"{mesh.stem}.quadriflow.obj", count):
+            made["QuadriFlow"] = asked
         made["Instant Meshes"] = instant(source, faces, count)
         for name, (points, polygons, seconds) in made.items():
             write_obj(folder / f"{mesh.stem}.{name.replace(' ', '-').lower()}.obj", points, polygons)

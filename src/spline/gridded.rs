@@ -2,12 +2,12 @@
 //!
 //! *Enters:* [`Gridded`]: faces with coordinates in blocks of cells, and the quad mesh. *Leaves:* a [`Cage`] with the quad mesh's points, its creases where edges of the surface that are sharp lie along edges of cells; and [`Sample`]s.
 
-use super::cage::{Cage, CellSide};
+use super::cage::Cage;
+use super::creases::{BLUNT, SHARP, creased};
 use super::error::SplineError;
 use super::limit::Place;
-use crate::geometry::disjoint_sets::UnionFind;
 use crate::geometry::mesh::{cross, dot, norm, sub};
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 
 /// A surface and its grid, as a folder has them.
 #[derive(Clone, Debug)]
@@ -57,15 +57,6 @@ impl Sample {
     }
 }
 
-/// An edge of cells is a crease where sharp edges cover this part of it.
-const COVERED: f64 = 0.9;
-/// Angles of creases, radians: 40° for the most part, 20° all along.
-const SHARP: f64 = 40.0 * std::f64::consts::PI / 180.0;
-const BLUNT: f64 = SHARP / 2.0;
-/// Creases that hang together have as many edges of cells, at least.
-const SHORTEST_NET: usize = 8;
-/// Creases that end inside have as many edges of cells, at least.
-const SHORTEST_CREASE: usize = 4;
 /// Faces are divided into parts that are no longer, cells.
 const PART: f64 = 0.75;
 /// One sample does for faces that are no longer, cells.
@@ -99,35 +90,6 @@ impl Cells {
     }
 }
 
-/// Creases inside, as chains of points, but those that end inside and have too few edges, and those of which all that hang together have too few.
-fn long_creases(cage: &Cage) -> Vec<Vec<u32>> {
-    let mut kept = cage.chains();
-    kept.retain(|chain| {
-        let ends = [chain[0], chain[chain.len() - 1]];
-        let goes_on = ends.iter().all(|&v| cage.is_corner[v as usize]) || ends[0] == ends[1];
-        goes_on || chain.len() > SHORTEST_CREASE
-    });
-    let mut sets = UnionFind::new(cage.vertices);
-    let mut length = vec![0; cage.vertices];
-    for step in kept.iter().flat_map(|chain| chain.windows(2)) {
-        sets.join(step[0] as usize, step[1] as usize);
-    }
-    for chain in &kept {
-        length[sets.find(chain[0] as usize)] += chain.len() - 1;
-    }
-    let leaving = cage.leaving();
-    let is_on_border = |v: u32| {
-        leaving[v as usize].is_some_and(|side| cage.turn_back(cage.star(side)[0]).is_none())
-    };
-    let on_border = kept.iter().flatten().filter(|&&v| is_on_border(v));
-    let touches: FxHashSet<usize> = on_border.map(|&v| sets.find(v as usize)).collect();
-    kept.retain(|chain| {
-        let set = sets.find(chain[0] as usize);
-        length[set] >= SHORTEST_NET || touches.contains(&set)
-    });
-    kept
-}
-
 impl Gridded {
     /// Least and greatest coordinates of vertices.
     pub fn bounds(&self) -> ([f64; 3], [f64; 3]) {
@@ -147,54 +109,18 @@ impl Gridded {
         moved
     }
 
-    /// The control mesh, its points those of the quad mesh. Edges of cells along which the surface turns by more than 40° for the most part, and by 20° all along, are creases.
+    /// The control mesh, its points those of the quad mesh, with creases where sharp edges of the surface are on edges of cells: see [`creased`].
     ///
     /// # Errors
     /// Cells that make no surface.
     pub fn cage(&self) -> Result<Cage, SplineError> {
         let [blunt, sharp] = [BLUNT, SHARP].map(|angle| self.covered(angle));
-        let cage = |is_crease: &dyn Fn([u32; 2]) -> bool, is_corner: Vec<bool>| {
-            let at = |(c, k): CellSide| {
-                let corners = self.cells[c as usize];
-                is_crease(sorted([
-                    corners[usize::from(k)],
-                    corners[usize::from((k + 1) & 3)],
-                ]))
-            };
-            Cage::new(self.points.len(), self.cells.clone(), at, is_corner)
-        };
-        let none = || vec![false; self.points.len()];
         let part = |covered: &FxHashMap<[u32; 2], f64>, ends: [u32; 2]| {
             covered.get(&ends).copied().unwrap_or(0.0)
         };
-        let all = cage(&|ends| part(&blunt, ends) >= COVERED, none())?;
-        // Chains that are sharp for the most part, and long enough not to be noise if they end inside.
-        let steps = |chain: &[u32]| -> Vec<[u32; 2]> {
-            chain.windows(2).map(|w| sorted([w[0], w[1]])).collect()
-        };
-        let mut kept: Vec<Vec<u32>> = all.chains();
-        kept.retain(|chain| {
-            let steps = steps(chain);
-            2.0 * steps.iter().map(|&s| part(&sharp, s)).sum::<f64>() >= steps.len() as f64
-        });
-        let mut edges: FxHashSet<[u32; 2]> = kept.iter().flat_map(|chain| steps(chain)).collect();
-        // Short ones are dropped; and where the limit surface would have no tangent plane, creases end an edge before, which makes some short.
-        loop {
-            let before = edges.len();
-            let found = cage(&|ends| edges.contains(&ends), none())?;
-            edges = long_creases(&found)
-                .iter()
-                .flat_map(|chain| steps(chain))
-                .collect();
-            let found = cage(&|ends| edges.contains(&ends), none())?;
-            for side in found.untidy_creases() {
-                let ends = [found.tail(side), found.tail((side.0, side.1 + 1))];
-                edges.remove(&sorted(ends));
-            }
-            if edges.len() == before {
-                return cage(&|ends| edges.contains(&ends), found.turns());
-            }
-        }
+        creased(self.points.len(), &self.cells, |ends| {
+            [part(&blunt, ends), part(&sharp, ends)]
+        })
     }
 
     /// Of edges of cells by their ends, the part of each that sharp edges of the surface cover.
@@ -348,10 +274,6 @@ impl Gridded {
         }
         Ok(samples)
     }
-}
-
-fn sorted([a, b]: [u32; 2]) -> [u32; 2] {
-    [a.min(b), a.max(b)]
 }
 
 /// Places of three samples in each of parts² equal parts of a triangle, by barycentric coordinates; quadratic functions are integrated exactly (Strang and Fix 1973).

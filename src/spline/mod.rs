@@ -13,6 +13,7 @@
 
 pub mod cad;
 pub mod cage;
+pub mod creases;
 mod error;
 pub mod evaluator;
 pub mod fit;
