@@ -10,8 +10,9 @@
 //! Prints figures as JSON, and writes the surface as triangles, cell by cell.
 
 use affine_atlas::spline::creases::creased;
+use affine_atlas::spline::equations::Equations;
 use affine_atlas::spline::evaluator::Evaluator;
-use affine_atlas::spline::fit::Fitter;
+use affine_atlas::spline::fit::fit;
 use affine_atlas::spline::gridded::Sample;
 use affine_atlas::spline::limit::Limit;
 use affine_atlas::spline::measure::shape;
@@ -62,7 +63,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         covered.get(&ends).copied().unwrap_or_default()
     })?;
     let evaluator = Evaluator::new(&cage);
-    let control = Fitter::new(&cage, &evaluator, &points)?.fit(&mut samples)?;
+    let mut equations = Equations::new(&cage, &evaluator, &points)?;
+    let control = fit(&mut equations, &mut samples)?;
     let limit = Limit::new(&cage, &evaluator, &control);
     let inside = |&(c, k): &(u32, u8)| {
         cage.across[c as usize][usize::from(k)].is_some() && cage.is_crease((c, k))
@@ -72,7 +74,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         cage.cells.len(),
         cage.vertices,
         cage.edges().filter(inside).count(),
-        shape(&limit).0.turned_over,
+        shape(&limit).turned_over,
     );
     let triangles = tessellate(&limit, PARTS);
     let mut out = BufWriter::new(File::create(surface)?);

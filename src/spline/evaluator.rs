@@ -21,6 +21,8 @@ struct Node {
     points: usize,
     /// Sixteen control points as weights of the points, where the piece is bicubic.
     regular: Option<Vec<[f64; 16]>>,
+    /// Where each is one of the points, which of the sixteen each point is.
+    order: Option<[u8; 16]>,
     /// Quarters at the four corners: their kind, and their points as weights, row by row. None where regular.
     quarters: Vec<(u32, Vec<f64>)>,
 }
@@ -137,9 +139,11 @@ impl Evaluator {
     }
 
     fn enter(&mut self, rings: &Rings) -> u32 {
+        let regular = rings.regular();
         self.nodes.push(Node {
             points: rings.points,
-            regular: rings.regular(),
+            order: regular.as_deref().and_then(order),
+            regular,
             quarters: Vec::new(),
         });
         self.nodes.len() as u32 - 1
@@ -151,13 +155,23 @@ impl Evaluator {
         &self.points[first as usize..][..self.nodes[node as usize].points]
     }
 
-    /// Weights of the point at a place of a cell, in the order of [`points`](Self::points).
-    pub fn value(&self, cell: u32, place: [f64; 2]) -> Vec<f64> {
-        let mut path = [(0u32, 0u8); MOST_DEPTH];
+    /// Weights of the point at a place of a cell, in the order of [`points`](Self::points), put in the place of what is in `value`.
+    pub fn value(&self, cell: u32, place: [f64; 2], value: &mut Vec<f64>) {
         let root = self.cell[cell as usize].0;
+        if let Some(order) = &self.nodes[root as usize].order {
+            let [[s, _], [t, _]] = place.map(uniform);
+            value.clear();
+            value.extend(
+                order
+                    .iter()
+                    .map(|&i| s[usize::from(i % 4)] * t[usize::from(i / 4)]),
+            );
+            return;
+        }
+        let mut path = [(0u32, 0u8); MOST_DEPTH];
         let (depth, node, at, _) = self.path(root, place, MOST_DEPTH, &mut path);
         let [s, t] = at.map(uniform);
-        self.back(&path[..depth], self.leaf(node, &s[0], &t[0], 1.0))
+        *value = self.back(&path[..depth], self.leaf(node, &s[0], &t[0], 1.0));
     }
 
     /// The same of the point and of the derivatives by s and t.
@@ -172,7 +186,11 @@ impl Evaluator {
         Weights {
             value: match is_end {
                 false => self.back(path, self.leaf(node, &s[0], &t[0], 1.0)),
-                true => self.value(cell, place),
+                true => {
+                    let mut value = Vec::new();
+                    self.value(cell, place, &mut value);
+                    value
+                }
             },
             derivative: [
                 self.back(path, self.leaf(node, &s[1], &t[0], scale)),
@@ -319,6 +337,20 @@ impl Evaluator {
             control,
         }
     }
+}
+
+/// Which of sixteen control points each point is, if that is all that it is.
+fn order(rows: &[[f64; 16]]) -> Option<[u8; 16]> {
+    let rows: &[[f64; 16]; 16] = rows.try_into().ok()?;
+    let mut order = [0; 16];
+    for (own, row) in order.iter_mut().zip(rows) {
+        let one = row.iter().position(|&x| x == 1.0)?;
+        if row.iter().filter(|&&x| x != 0.0).count() > 1 {
+            return None;
+        }
+        *own = one as u8;
+    }
+    Some(order)
 }
 
 /// A square part of a cell with the points that its surface depends on.

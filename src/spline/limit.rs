@@ -44,9 +44,24 @@ const BESIDE: f64 = 1e-4;
 impl<'a> Limit<'a> {
     /// The surface of a control mesh.
     pub fn new(cage: &'a Cage, evaluator: &'a Evaluator, control: &'a [[f64; 3]]) -> Self {
-        let of_cell = |c| evaluator.pieces(control, c as u32, PIECES_DEPTH);
+        let all: Vec<u32> = (0..cage.cells.len() as u32).collect();
+        Self::of_cells(cage, evaluator, control, &all)
+    }
+
+    /// The same, prepared for places in some cells; others take longer.
+    pub fn of_cells(
+        cage: &'a Cage,
+        evaluator: &'a Evaluator,
+        control: &'a [[f64; 3]],
+        cells: &[u32],
+    ) -> Self {
+        let mut pieces = vec![Vec::new(); cage.cells.len()];
+        let own = parallel::map(cells, |_, &c| evaluator.pieces(control, c, PIECES_DEPTH));
+        for (&cell, own) in cells.iter().zip(own) {
+            pieces[cell as usize] = own;
+        }
         Self {
-            pieces: parallel::map_numbers(cage.cells.len(), of_cell),
+            pieces,
             cage,
             evaluator,
             control,

@@ -88,20 +88,38 @@ fn places(is_irregular: [bool; 2]) -> Vec<f64> {
     all.map(|x| x.clamp(INSIDE, 1.0 - INSIDE)).collect()
 }
 
-/// Looks for folds, and lists the cells in which there are some.
-pub fn shape(limit: &Limit<'_>) -> (Shape, Vec<u32>) {
+/// Looks for folds.
+pub fn shape(limit: &Limit<'_>) -> Shape {
     let cells = limit.cage.cells.len();
-    let irregular = limit.cage.irregular();
-    let each = parallel::map_numbers(cells, |cell| Cell::new(limit, cell as u32, &irregular));
+    let each = each_of(limit, &all(limit));
     let area: f64 = each.iter().map(|cell| cell.area).sum();
     let over: f64 = each.iter().map(|cell| cell.over).sum();
     let least = each.iter().map(|cell| cell.least);
-    let shape = Shape {
+    Shape {
         least_jacobian: least.fold(f64::INFINITY, f64::min) * cells as f64 / area,
         turned_over: over / area,
-    };
-    let folded = (0..).zip(&each).filter(|(_, cell)| cell.over > 0.0);
-    (shape, folded.map(|(cell, _)| cell).collect())
+    }
+}
+
+/// The cells in which there are folds.
+pub fn folded(limit: &Limit<'_>) -> Vec<u32> {
+    folded_of(limit, &all(limit))
+}
+
+/// Those of some cells.
+pub fn folded_of(limit: &Limit<'_>, cells: &[u32]) -> Vec<u32> {
+    let each = each_of(limit, cells);
+    let folded = cells.iter().zip(&each).filter(|(_, cell)| cell.over > 0.0);
+    folded.map(|(&cell, _)| cell).collect()
+}
+
+fn all(limit: &Limit<'_>) -> Vec<u32> {
+    (0..limit.cage.cells.len() as u32).collect()
+}
+
+fn each_of(limit: &Limit<'_>, cells: &[u32]) -> Vec<Cell> {
+    let irregular = limit.cage.irregular();
+    parallel::map(cells, |_, &cell| Cell::new(limit, cell, &irregular))
 }
 
 /// The Jacobians of a cell.

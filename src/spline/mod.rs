@@ -14,9 +14,12 @@
 pub mod cad;
 pub mod cage;
 pub mod creases;
+pub mod equations;
 mod error;
 pub mod evaluator;
+mod fairness;
 pub mod fit;
+mod folds;
 pub mod gridded;
 pub mod limit;
 pub mod measure;
@@ -37,8 +40,8 @@ use crate::geometry::deviation::{Deviation, Sampling, Triangles, deviation};
 use crate::geometry::mesh::{norm, sub};
 use cad::Faces;
 use cage::Cage;
+use equations::Equations;
 use evaluator::Evaluator;
-use fit::Fitter;
 use limit::Limit;
 use measure::{Errors, Shape};
 use patches::Patches;
@@ -120,7 +123,8 @@ pub fn fit(gridded: &Gridded) -> Result<Spline, SplineError> {
     let cage = gridded.cage()?;
     let mut samples = gridded.samples()?;
     let evaluator = Evaluator::new(&cage);
-    let mut control = Fitter::new(&cage, &evaluator, &gridded.points)?.fit(&mut samples)?;
+    let mut equations = Equations::new(&cage, &evaluator, &gridded.points)?;
+    let mut control = fit::fit(&mut equations, &mut samples)?;
     let limit = Limit::new(&cage, &evaluator, &control);
     let triangles = tessellate(&limit, parts(cage.cells.len()));
     let own = Triangles {
@@ -131,7 +135,7 @@ pub fn fit(gridded: &Gridded) -> Result<Spline, SplineError> {
         positions: &gridded.positions,
         faces: &gridded.faces,
     };
-    let (errors, shape) = (measure::errors(&limit, &samples), measure::shape(&limit).0);
+    let (errors, shape) = (measure::errors(&limit, &samples), measure::shape(&limit));
     let deviation = deviation(source, own, SAMPLING);
     for p in &mut control {
         *p = std::array::from_fn(|i| p[i] + middle[i]);

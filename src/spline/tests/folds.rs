@@ -1,3 +1,5 @@
+use super::super::cage::CellSide;
+use super::super::evaluator::Evaluator;
 use super::super::measure;
 use super::*;
 
@@ -13,61 +15,6 @@ fn sheet(n: u32, crease: impl Fn(CellSide) -> bool) -> (Cage, Vec<[f64; 3]>) {
     (cage, points.collect())
 }
 
-fn squares(differences: &[Difference], points: &[[f64; 3]]) -> f64 {
-    let sum = |d: &Difference, i: usize| -> f64 {
-        d.points
-            .iter()
-            .map(|&(v, x)| x * points[v as usize][i])
-            .sum()
-    };
-    differences
-        .iter()
-        .flat_map(|d| (0..3).map(move |i| sum(d, i).powi(2)))
-        .sum()
-}
-
-#[test]
-fn edges_of_an_affine_polygon_are_flat_and_no_others() {
-    for n in 3..9usize {
-        let ends: Vec<u32> = (1..=n as u32).collect();
-        let turn = |i: usize| 2.0 * PI * i as f64 / n as f64;
-        let corner = |i: usize| {
-            let (y, x) = turn(i).sin_cos();
-            [3.0 * x + y, 0.5 * y - x, 0.7 * x + 2.0 * y]
-        };
-        let mut points = vec![[0.0; 3]];
-        points.extend((0..n).map(corner));
-        let differences = from_flat(0, &ends);
-        assert_eq!(differences.len(), n - 2);
-        assert!(squares(&differences, &points) < 1e-24, "{n}");
-        // Each direction but those of affine maps, all edges and the waves that turn twice and more.
-        for k in (0..=n / 2).filter(|&k| k != 1) {
-            let mut other = points.clone();
-            (0..n).for_each(|i| other[i + 1][2] += (turn(i) * k as f64).cos());
-            let size: f64 = (0..n).map(|i| (turn(i) * k as f64).cos().powi(2)).sum();
-            let found = squares(&differences, &other);
-            assert!(
-                (found - 2.0 * size).abs() < 1e-9,
-                "{n} {k}: {found}, {size}"
-            );
-        }
-    }
-}
-
-#[test]
-fn flat_edges_of_a_regular_point_are_both_second_differences() {
-    let mut points = vec![[0.1, 0.2, 0.3], [1.0, 0.3, 0.2], [0.2, 0.9, -0.4]];
-    points.extend([[-1.1, 0.0, 0.5], [0.1, -1.0, 0.6]]);
-    let second = |a: u32, b: u32| Difference {
-        points: vec![(0, -2.0), (a, 1.0), (b, 1.0)],
-        at: 0,
-        wanted: [0.0; 3],
-    };
-    let both = squares(&[second(1, 3), second(2, 4)], &points);
-    let flat = squares(&from_flat(0, &[1, 2, 3, 4]), &points);
-    assert!((both - flat).abs() < 1e-12, "{both} {flat}");
-}
-
 #[test]
 fn sheets_fold_where_a_point_is_moved_across_others() {
     let (cage, points) = sheet(6, |_| false);
@@ -77,7 +24,7 @@ fn sheets_fold_where_a_point_is_moved_across_others() {
         let mut control = points.clone();
         control[middle][0] += by;
         let limit = Limit::new(&cage, &evaluator, &control);
-        let (shape, folded) = measure::shape(&limit);
+        let (shape, folded) = (measure::shape(&limit), folded(&limit));
         // Signs of Jacobians, much denser.
         let dense = (0..36u32).any(|cell| {
             (0..4096).any(|i| {
@@ -94,6 +41,65 @@ fn sheets_fold_where_a_point_is_moved_across_others() {
 }
 
 #[test]
+fn steps_are_shortened_where_cells_would_fold_and_nowhere_else() {
+    let (cage, points) = sheet(9, |_| false);
+    let evaluator = Evaluator::new(&cage);
+    let mut equations = Equations::new(&cage, &evaluator, &points).unwrap();
+    // A corner of the sheet moves a little, a point inside across others.
+    let (inside, corner) = (5 * 10 + 5, 0);
+    let mut wanted = points.clone();
+    wanted[inside][0] += 3.0;
+    wanted[corner][2] += 0.5;
+    assert!(Folds::of(&equations, &wanted).any());
+    let none = Folds::none(&cage);
+    let (found, folds) = shortened(&mut equations, &points, &wanted, &none);
+    assert!(!folds.any() && !Folds::of(&equations, &found).any());
+    assert_eq!(found[corner], wanted[corner]);
+    let part = (found[inside][0] - points[inside][0]) / 3.0;
+    assert!(0.0 < part && part <= 0.5, "{part}");
+    assert!(equations.fairness[inside] > 1.0 && equations.fairness[corner] == 1.0);
+    // What folds already may go all the way.
+    let given = Folds::of(&equations, &wanted);
+    let (found, folds) = shortened(&mut equations, &points, &wanted, &given);
+    assert_eq!(found, wanted);
+    assert_eq!(folds.cells, given.cells);
+}
+
+#[test]
+fn fairness_unfolds_what_samples_fold() {
+    let (cage, points) = sheet(6, |_| false);
+    let evaluator = Evaluator::new(&cage);
+    let limit = Limit::new(&cage, &evaluator, &points);
+    // Samples of two places are each where the other should be.
+    let places = (0..36u32).flat_map(|cell| (0..9).map(move |i| (cell, [i % 3, i / 3])));
+    let samples: Vec<Sample> = places
+        .map(|(cell, place)| {
+            let at = place.map(|x| (f64::from(x) + 0.5) / 3.0);
+            let from = match cell {
+                14 => 21,
+                21 => 14,
+                other => other,
+            };
+            let (point, normal) = limit.normal(from, at);
+            Sample {
+                point,
+                normal,
+                area: 1.0,
+                weight: 1.0,
+                cell,
+                at,
+            }
+        })
+        .collect();
+    let mut equations = Equations::new(&cage, &evaluator, &points).unwrap();
+    let folded = equations.solve(&samples).unwrap();
+    let folds = Folds::of(&equations, &folded);
+    assert!(folds.any());
+    let found = unfolded(&mut equations, &folds, &samples).unwrap();
+    assert!(!Folds::of(&equations, &found.unwrap()).any());
+}
+
+#[test]
 fn a_bend_by_more_than_a_right_angle_within_an_eighth_of_a_cell_counts() {
     // A crease lies between cells, and does not.
     let bent = |is_crease: bool| {
@@ -107,9 +113,7 @@ fn a_bend_by_more_than_a_right_angle_within_an_eighth_of_a_cell_counts() {
             *p = [0.02 * x, p[1], x.abs()];
         }
         let evaluator = Evaluator::new(&cage);
-        measure::shape(&Limit::new(&cage, &evaluator, &points))
-            .0
-            .turned_over
+        measure::shape(&Limit::new(&cage, &evaluator, &points)).turned_over
     };
     assert_eq!(bent(true), 0.0);
     assert!(bent(false) > 0.0);
