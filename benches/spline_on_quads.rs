@@ -1,11 +1,12 @@
 //! The fit of `affine-atlas fit` on any quads, so that those of other programs can be held beside those of the atlas: `benches/peers/splines.py` calls it.
 //!
 //! ```text
-//! cargo bench --bench spline_on_quads -- QUADS.obj SAMPLES.txt SHARP.txt SURFACE.obj
+//! cargo bench --bench spline_on_quads -- QUADS.obj SAMPLES.txt SHARP.txt SURFACE.obj FACETS
 //! ```
 //!
 //! * SAMPLES.txt: a line each, x y z, normal, area, cell, s t in it
 //! * SHARP.txt: a line an edge of cells that sharp edges cover, its ends, and the parts of it that those above 20° and above 40° cover
+//! * FACETS: faces of the surface that samples are of
 //!
 //! Prints figures as JSON, and writes the surface as triangles, cell by cell.
 
@@ -30,8 +31,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let given: Vec<String> = std::env::args().skip(1).collect();
     let files: Vec<&str> = given.iter().map(String::as_str).collect();
     let files: Vec<&str> = files.into_iter().filter(|a| *a != "--bench").collect();
-    let [quads, samples, sharp, surface] = files[..] else {
-        return Err("QUADS.obj SAMPLES.txt SHARP.txt SURFACE.obj".into());
+    let [quads, samples, sharp, surface, facets] = files[..] else {
+        return Err("QUADS.obj SAMPLES.txt SHARP.txt SURFACE.obj FACETS".into());
     };
     let (mut points, mut cells) = (Vec::new(), Vec::new());
     for line in read_to_string(quads)?.lines() {
@@ -63,7 +64,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         covered.get(&ends).copied().unwrap_or_default()
     })?;
     let evaluator = Evaluator::new(&cage);
-    let mut equations = Equations::new(&cage, &evaluator, &points)?;
+    let mut equations = Equations::new(&cage, &evaluator, &points, facets.parse()?)?;
     let control = fit(&mut equations, &mut samples)?;
     let limit = Limit::new(&cage, &evaluator, &control);
     let inside = |&(c, k): &(u32, u8)| {

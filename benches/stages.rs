@@ -1,12 +1,14 @@
 //! CPU seconds, share and peak memory of every stage of the job on the fixtures, or on the meshes named as arguments.
 //!
-//! `cargo bench --bench stages -- [--levels N] [--runs N] [MESH…]`: each mesh and its N midpoint subdivisions with flips, one
+//! `cargo bench --bench stages -- [--levels N] [--runs N] [--flat] [MESH…]`: each mesh and its N midpoint subdivisions with flips, one
 //! thread; the fastest run (of three) is shown, and in it the parts that stages tell of, each without those inside it. After each mesh: a table of its levels and how the time grows
-//! between them.
+//! between them. With `--flat` images are of flat patches, and cones are eight far apart instead of being searched for.
 
 mod common;
 
+use affine_atlas::atlas::patch::Domain;
 use affine_atlas::config::Config;
+use affine_atlas::flow::cones::ConeStrategy;
 use affine_atlas::flow::ricci::Scheme;
 use affine_atlas::observe::{Observer, PARTS};
 use affine_atlas::{job, outcome::AssetState};
@@ -137,7 +139,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let mut best: Option<Level> = None;
             for _ in 0..arguments.runs {
                 *parts.0.lock().unwrap_or_else(PoisonError::into_inner) = PartsSoFar::default();
-                let stages = measure(path)?;
+                let stages = measure(path, arguments.flat)?;
                 let of_run = parts.0.lock().unwrap_or_else(PoisonError::into_inner);
                 let level = Level {
                     vertices: triangles.positions.len(),
@@ -244,10 +246,15 @@ fn print_table(name: &str, levels: &[Level]) {
 }
 
 /// Builds once into a temporary folder; stages in order, those that come again added up.
-fn measure(mesh: &Path) -> Result<Vec<Stage>, Box<dyn Error>> {
+fn measure(mesh: &Path, flat: bool) -> Result<Vec<Stage>, Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     let mut config = Config::default();
     config.flow.scheme = Scheme::VertexScaling;
+    if flat {
+        config.images.domain = Some(Domain::Flat);
+        config.cones.strategy = ConeStrategy::Spread;
+    }
+    let config = config.resolved()?;
     let watch = Stopwatch::default();
     let given = mesh.to_string_lossy();
     let outcome = job::run(mesh, &given, folder.path(), "mesh", &config, &watch);

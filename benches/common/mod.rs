@@ -11,12 +11,14 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// `[--levels N] [--runs N] MESH…`
+/// `[--levels N] [--runs N] [--flat] MESH…`
 pub struct Arguments {
     /// Midpoint subdivisions of each mesh beside the mesh itself.
     pub levels: usize,
     /// Runs of which the fastest counts.
     pub runs: usize,
+    /// Flat patches with cones given, in place of the default.
+    pub flat: bool,
     pub meshes: Vec<PathBuf>,
 }
 
@@ -25,6 +27,7 @@ impl Arguments {
         let mut given = Self {
             levels: 0,
             runs: 3,
+            flat: false,
             meshes: Vec::new(),
         };
         let mut arguments = std::env::args().skip(1);
@@ -36,6 +39,7 @@ impl Arguments {
             match argument.as_str() {
                 "--levels" => given.levels = number()?,
                 "--runs" => given.runs = number()?.max(1),
+                "--flat" => given.flat = true,
                 // What cargo adds.
                 "--bench" => {}
                 other if other.starts_with('-') => return Err(format!("no option {other}").into()),

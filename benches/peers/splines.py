@@ -204,7 +204,7 @@ def on_quads(fitter, source, faces, quads, folder):
     paths = [folder / f"{quads.stem}.{name}" for name in ("samples.txt", "sharp.txt", "surface.obj")]
     np.savetxt(paths[0], places(source, faces, points, cells), "%.12g")
     paths[1].write_text("".join("%d %d %g %g\n" % tuple(row) for row in covers(source, faces, points, cells)))
-    said, seconds = run(fitter, quads, *paths)
+    said, seconds = run(fitter, quads, *paths, str(len(faces)))
     if said.returncode:
         return said.stderr.strip().splitlines()[-1]
     points, triangles = read_obj(paths[2])

@@ -19,6 +19,8 @@ use rayon::prelude::*;
 
 /// Weight of squares of second differences beside those of distances.
 const FAIR: f64 = 1e-6;
+/// So many times more at most where cells are no larger than faces, and with the square of faces a cell less where they are: there, distances say how the surface bends from one face to the next only, and would have every face flat.
+const FAIR_WITHIN_FACES: f64 = 100.0;
 /// Weight of squares of distances along tangent planes beside those to them: without, surfaces slide along themselves.
 const ALONG: f64 = 0.1;
 /// A sample whose direction is farther from the normal, as a squared cosine, is not at its nearest place and counts with all of its distance.
@@ -106,7 +108,7 @@ impl Beside {
 }
 
 impl<'a> Equations<'a> {
-    /// Prepares the pattern. `quads`: points of the quad mesh.
+    /// Prepares the pattern. `quads`: points of the quad mesh; `facets`: faces of the surface that samples are of, without those that lie in one plane with others.
     ///
     /// # Errors
     /// Too little memory.
@@ -114,7 +116,10 @@ impl<'a> Equations<'a> {
         cage: &'a Cage,
         evaluator: &'a Evaluator,
         quads: &[[f64; 3]],
+        facets: usize,
     ) -> Result<Self, SplineError> {
+        let cells_a_facet = cage.cells.len() as f64 / facets.max(1) as f64;
+        let fairness = 1.0 + FAIR_WITHIN_FACES * cells_a_facet.min(1.0).powi(2);
         let differences = differences(cage, quads);
         let mut pairs = Vec::new();
         for cell in 0..cage.cells.len() as u32 {
@@ -131,7 +136,7 @@ impl<'a> Equations<'a> {
         }
         Ok(Self {
             solver: SymmetricSolver::new(cage.vertices, &pairs)?,
-            fairness: vec![1.0; cage.vertices],
+            fairness: vec![fairness; cage.vertices],
             is_flat: false,
             cage,
             evaluator,

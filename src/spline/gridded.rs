@@ -6,6 +6,7 @@ use super::cage::Cage;
 use super::creases::{BLUNT, SHARP, creased};
 use super::error::SplineError;
 use super::limit::Place;
+use crate::geometry::disjoint_sets::UnionFind;
 use crate::geometry::mesh::{cross, dot, norm, sub};
 use rustc_hash::FxHashMap;
 
@@ -63,6 +64,8 @@ const PART: f64 = 0.75;
 const SMALL: f64 = 0.25;
 /// Parts along a side of a face, at most.
 const MOST_PARTS: f64 = 64.0;
+/// Faces whose normals differ by no more are in one plane, radians.
+const FLAT: f64 = 1e-3;
 /// How far from a line of the grid an edge that lies on it may be, cells.
 const ON_LINE: f64 = 1e-9;
 
@@ -147,6 +150,29 @@ impl Gridded {
             }
         }
         covered
+    }
+
+    /// Faces, those side by side in one plane counted once: how many faces the mesh had before it was divided along lines of the grid, or fewer.
+    pub fn facets(&self) -> usize {
+        let normals: Vec<[f64; 3]> = self.faces.iter().map(|f| self.doubled(f)).collect();
+        let mut beside: FxHashMap<[u32; 2], usize> = FxHashMap::default();
+        let mut facets = UnionFind::new(self.faces.len());
+        let mut count = self.faces.len();
+        for (f, corners) in self.faces.iter().enumerate() {
+            for k in 0..3 {
+                let [a, b] = [corners[k], corners[(k + 1) % 3]];
+                beside.insert([a, b], f);
+                let Some(&other) = beside.get(&[b, a]) else {
+                    continue;
+                };
+                let (m, n) = (normals[f], normals[other]);
+                let is_flat = norm(cross(m, n)).atan2(dot(m, n)) <= FLAT;
+                if is_flat && facets.join(f, other) {
+                    count -= 1;
+                }
+            }
+        }
+        count
     }
 
     /// The edges of cells that a segment in a block lies on, and how much of each that is.

@@ -123,7 +123,7 @@ pub fn fit(gridded: &Gridded) -> Result<Spline, SplineError> {
     let cage = gridded.cage()?;
     let mut samples = gridded.samples()?;
     let evaluator = Evaluator::new(&cage);
-    let mut equations = Equations::new(&cage, &evaluator, &gridded.points)?;
+    let mut equations = Equations::new(&cage, &evaluator, &gridded.points, gridded.facets())?;
     let mut control = fit::fit(&mut equations, &mut samples)?;
     let limit = Limit::new(&cage, &evaluator, &control);
     let triangles = tessellate(&limit, parts(cage.cells.len()));

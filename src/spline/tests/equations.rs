@@ -61,7 +61,7 @@ fn with_samples(test: impl Fn(&Cage, &Evaluator, &[[f64; 3]], Vec<Sample>)) {
 #[test]
 fn a_step_minimises_distances_to_tangent_planes() {
     with_samples(|cage, evaluator, quads, mut samples| {
-        let mut equations = Equations::new(cage, evaluator, quads).unwrap();
+        let mut equations = Equations::new(cage, evaluator, quads, 1_000_000).unwrap();
         let control = equations.solve(&samples).unwrap();
         let limit = Limit::new(cage, evaluator, &control);
         move_places(&limit, &mut samples);
@@ -79,7 +79,7 @@ fn a_step_minimises_distances_to_tangent_planes() {
             });
             let differences = equations.differences.iter().map(|d| {
                 let lacks = sub(d.wanted, d.sum(|v| control[v as usize]));
-                fair * dot(lacks, lacks)
+                fair * equations.fairness[d.at as usize] * dot(lacks, lacks)
             });
             distances.sum::<f64>() + differences.sum::<f64>()
         };
@@ -112,7 +112,7 @@ fn five_steps_come_nearer_than_ten_turns_of_places_and_points() {
     with_samples(|cage, evaluator, quads, samples| {
         let reached = |with_steps: bool, rounds: usize| {
             let mut samples = samples.clone();
-            let mut equations = Equations::new(cage, evaluator, quads).unwrap();
+            let mut equations = Equations::new(cage, evaluator, quads, 1_000_000).unwrap();
             let mut control = equations.solve(&samples).unwrap();
             for _ in 0..rounds {
                 let limit = Limit::new(cage, evaluator, &control);
@@ -129,4 +129,52 @@ fn five_steps_come_nearer_than_ten_turns_of_places_and_points() {
         let (steps, turns) = (reached(true, 5), reached(false, 10));
         assert!(steps < turns, "{steps} {turns}");
     });
+}
+
+#[test]
+fn fairness_counts_more_where_cells_are_no_larger_than_faces() {
+    let (cage, points) = tube();
+    let evaluator = Evaluator::new(&cage);
+    let fairness = |facets: usize| {
+        let equations = Equations::new(&cage, &evaluator, &points, facets).unwrap();
+        assert!(
+            equations
+                .fairness
+                .iter()
+                .all(|&f| f == equations.fairness[0])
+        );
+        equations.fairness[0]
+    };
+    let cells = cage.cells.len();
+    assert_eq!(fairness(cells), 1.0 + FAIR_WITHIN_FACES);
+    assert_eq!(fairness(cells / 5), 1.0 + FAIR_WITHIN_FACES);
+    assert!((fairness(10 * cells) - 1.0 - FAIR_WITHIN_FACES / 100.0).abs() < 1e-12);
+}
+
+#[test]
+fn faces_in_one_plane_are_one_facet() {
+    // A strip of four triangles, bent along the edge in its middle.
+    let facets = |height: f64| {
+        let positions = vec![
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [2.0, 0.0, height],
+            [0.0, 1.0, 0.0],
+            [1.0, 1.0, 0.0],
+            [2.0, 1.0, height],
+        ];
+        let gridded = super::super::Gridded {
+            positions,
+            faces: vec![[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]],
+            block: Vec::new(),
+            uv: Vec::new(),
+            points: Vec::new(),
+            cells: Vec::new(),
+            cell_block: Vec::new(),
+            cell_at: Vec::new(),
+        };
+        gridded.facets()
+    };
+    assert_eq!(facets(0.0), 1);
+    assert_eq!(facets(0.1), 2);
 }

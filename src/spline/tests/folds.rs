@@ -44,7 +44,7 @@ fn sheets_fold_where_a_point_is_moved_across_others() {
 fn steps_are_shortened_where_cells_would_fold_and_nowhere_else() {
     let (cage, points) = sheet(9, |_| false);
     let evaluator = Evaluator::new(&cage);
-    let mut equations = Equations::new(&cage, &evaluator, &points).unwrap();
+    let mut equations = Equations::new(&cage, &evaluator, &points, 1_000_000).unwrap();
     // A corner of the sheet moves a little, a point inside across others.
     let (inside, corner) = (5 * 10 + 5, 0);
     let mut wanted = points.clone();
@@ -57,7 +57,7 @@ fn steps_are_shortened_where_cells_would_fold_and_nowhere_else() {
     assert_eq!(found[corner], wanted[corner]);
     let part = (found[inside][0] - points[inside][0]) / 3.0;
     assert!(0.0 < part && part <= 0.5, "{part}");
-    assert!(equations.fairness[inside] > 1.0 && equations.fairness[corner] == 1.0);
+    assert!(equations.fairness[inside] > 2.0 && equations.fairness[corner] < 1.1);
     // What folds already may go all the way.
     let given = Folds::of(&equations, &wanted);
     let (found, folds) = shortened(&mut equations, &points, &wanted, &given);
@@ -91,7 +91,7 @@ fn fairness_unfolds_what_samples_fold() {
             }
         })
         .collect();
-    let mut equations = Equations::new(&cage, &evaluator, &points).unwrap();
+    let mut equations = Equations::new(&cage, &evaluator, &points, 1_000_000).unwrap();
     let folded = equations.solve(&samples).unwrap();
     let folds = Folds::of(&equations, &folded);
     assert!(folds.any());
