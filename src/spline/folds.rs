@@ -110,8 +110,8 @@ pub fn shortened(
     let mut control = to.to_vec();
     let mut now = Folds::of(equations, &control);
     make_fairer(equations, &now.cells, false);
-    // Cells by the points that they depend on.
     let mut part = vec![1.0f64; cage.vertices];
+    // Cells by the points that they depend on.
     let mut around: Vec<Vec<u32>> = Vec::new();
     for halving in 0.. {
         let is_new = |cell: &&u32| !folds.is_in(**cell);
