@@ -48,9 +48,6 @@ struct Collector {
     rows: Vec<u32>,
 }
 
-/// Where the entries of each row begin, and column and place in it of each entry.
-pub(super) type ByRow = (Vec<u32>, Vec<(u32, u32)>);
-
 impl Columns {
     fn with_capacity(columns: usize, entries: usize) -> Self {
         let mut first = Vec::with_capacity(columns + 1);
@@ -92,8 +89,8 @@ impl Columns {
         product
     }
 
-    /// Entries by rows.
-    pub(super) fn by_row(&self, rows: usize) -> ByRow {
+    /// Entries by rows: where those of a row begin, and column and place in it of each.
+    pub(super) fn by_row(&self, rows: usize) -> (Vec<u32>, Vec<(u32, u32)>) {
         let mut first = vec![0u32; rows + 1];
         for &r in &self.row {
             first[r as usize + 1] += 1;
