@@ -20,7 +20,12 @@ pub struct Progress {
     done: &'static str,
     /// Of a batch: what runs, and how much of the work is done.
     batch: Mutex<Option<Running>>,
+    /// When a stage of one of several components was last told of in a line.
+    told: Mutex<Option<Instant>>,
 }
+
+/// Stages of small components follow each other by hundreds a second; a log wants a line now and then.
+const BETWEEN_LINES: Duration = Duration::from_secs(1);
 
 enum Style {
     Silent,
@@ -97,6 +102,7 @@ impl Progress {
             assets,
             done: "built",
             batch: Mutex::default(),
+            told: Mutex::default(),
         }
     }
 
@@ -225,9 +231,21 @@ impl Observer for AssetProgress<'_> {
 }
 
 impl Progress {
+    /// Whether the last line about a component is old enough for another.
+    fn is_time_for_a_line(&self) -> bool {
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_time = told.is_none_or(|at| at.elapsed() >= BETWEEN_LINES);
+        if is_time {
+            *told = Some(Instant::now());
+        }
+        is_time
+    }
+
     fn show_stage(&self, index: usize, id: &str, stage: &Stage) {
         match &self.style {
             Style::Silent => {}
+            Style::Lines { steps: false } if stage.components > 1 && !self.is_time_for_a_line() => {
+            }
             Style::Lines { .. } => terminal::print_error(&format!(
                 "[{}/{}] {id}: {}\n",
                 index + 1,

@@ -4,6 +4,7 @@
 
 use super::gridded::Sample;
 use super::limit::Limit;
+use super::tessellation::{parts, triangles};
 use crate::geometry::mesh::{cross, dot, norm, sub};
 use crate::parallel;
 use rayon::prelude::*;
@@ -26,7 +27,7 @@ pub struct Errors {
 pub struct Shape {
     /// Smallest |∂s × ∂t| over its mean, over places that are farther than a sixteenth of a cell from the sides: at irregular points it vanishes.
     pub least_jacobian: f64,
-    /// Part of the area beside places where the surface is folded, or bent as much as if it were: from one place to the next, an eighth of a cell away or less, the normal turns by a right angle or more.
+    /// Part of the area where the surface is folded, or bent as much as if it were: from one place to the next, an eighth of a cell away or less, the normal turns by a right angle or more, or a triangle of the tessellation looks away from it at one of its corners.
     pub turned_over: f64,
 }
 
@@ -163,6 +164,19 @@ impl Cell {
                 }
             }
         }
+        let over = f64::max(over, area * away(limit, cell));
         Self { area, over, least }
     }
+}
+
+/// Part of a cell whose triangles look away from the surface.
+fn away(limit: &Limit<'_>, cell: u32) -> f64 {
+    let parts = parts(limit.cage.cells.len());
+    let row = parts + 1;
+    let places = (0..row * row).map(|i| [i % row, i / row].map(|x| x as f64 / parts as f64));
+    let jets: Vec<_> = places.map(|at| limit.normal(cell, at)).collect();
+    let quads = (0..parts).flat_map(|j| (0..parts).map(move |i| row * j + i));
+    let quads = quads.map(|at| [at, at + 1, at + row + 1, at + row]);
+    let away = quads.filter(|&quad| triangles(&jets, quad).1 <= 0.0);
+    away.count() as f64 / (parts * parts) as f64
 }

@@ -45,13 +45,10 @@ use evaluator::Evaluator;
 use limit::Limit;
 use measure::{Errors, Shape};
 use patches::Patches;
-use tessellation::{Tessellation, tessellate};
+use tessellation::{Tessellation, parts, tessellate};
 
 /// Normals of B-spline faces differ by no more beside irregular points, degrees.
 pub const DEFAULT_ANGLE: f64 = 0.1;
-/// Triangles that distances both ways are measured with, at least, and parts along a side of a cell at most.
-const TRIANGLES: usize = 100_000;
-const MOST_PARTS: usize = 8;
 /// Samples of each surface.
 const SAMPLING: Sampling = Sampling {
     samples: 100_000,
@@ -104,11 +101,6 @@ impl Spline {
         let limit = Limit::new(&cage, &evaluator, &control);
         Ok((cad::faces(&limit, angle)?, patches::patches(&limit)?))
     }
-}
-
-fn parts(cells: usize) -> usize {
-    let wanted = (TRIANGLES as f64 / (2 * cells.max(1)) as f64).sqrt();
-    (wanted.ceil() as usize).clamp(2, MOST_PARTS)
 }
 
 /// Fits a surface.

@@ -24,6 +24,17 @@ pub struct Tessellation {
     pub parts: usize,
 }
 
+/// At least so many triangles all in all …
+const TRIANGLES: usize = 100_000;
+/// … but a side of a cell has no more parts.
+const MOST_PARTS: usize = 8;
+
+/// Parts along a side of a cell of surfaces with so many cells.
+pub fn parts(cells: usize) -> usize {
+    let wanted = (TRIANGLES as f64 / (2 * cells.max(1)) as f64).sqrt();
+    (wanted.ceil() as usize).clamp(2, MOST_PARTS)
+}
+
 /// A place that cells share.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 enum Name {
@@ -105,16 +116,7 @@ pub fn tessellate(limit: &Limit<'_>, parts: usize) -> Tessellation {
                     (j + 1) * row + i + 1,
                     (j + 1) * row + i,
                 ];
-                // Along the diagonal with which both triangles look more the way the surface does.
-                let [one, other] = [
-                    [[at[0], at[1], at[2]], [at[0], at[2], at[3]]],
-                    [[at[0], at[1], at[3]], [at[1], at[2], at[3]]],
-                ];
-                let jets = &jets[c as usize];
-                let triangles = match likeness(jets, &one) >= likeness(jets, &other) {
-                    true => one,
-                    false => other,
-                };
+                let (triangles, _) = triangles(&jets[c as usize], at);
                 for corners in triangles {
                     out.faces.push(corners.map(|i| numbers[i][0]));
                     out.smooth_faces.push(corners.map(|i| numbers[i][1]));
@@ -132,16 +134,24 @@ pub fn tessellate(limit: &Limit<'_>, parts: usize) -> Tessellation {
     out
 }
 
-/// The least cosine between the normal of a triangle and one of its corners'.
-fn likeness(jets: &[([f64; 3], [f64; 3])], triangles: &[[usize; 3]; 2]) -> f64 {
-    let of = |corners: &[usize; 3]| {
+/// Two triangles of a quad whose corners have these numbers, counterclockwise, along the diagonal with which both look more the way the surface does; and the least cosine between one's normal and that of the surface at one of its corners.
+pub(super) fn triangles(
+    jets: &[([f64; 3], [f64; 3])],
+    [a, b, c, d]: [usize; 4],
+) -> ([[usize; 3]; 2], f64) {
+    let of = |corners: [usize; 3]| {
         let [p, q, r] = corners.map(|i| jets[i].0);
         let own = cross(sub(q, p), sub(r, p));
         let length = norm(own).max(f64::MIN_POSITIVE);
         let cosines = corners.map(|i| dot(own, jets[i].1) / length);
         cosines.into_iter().fold(1.0, f64::min)
     };
-    of(&triangles[0]).min(of(&triangles[1]))
+    let both = [[[a, b, c], [a, c, d]], [[a, b, d], [b, c, d]]];
+    let [one, other] = both.map(|[t, u]| of(t).min(of(u)));
+    match one >= other {
+        true => (both[0], one),
+        false => (both[1], other),
+    }
 }
 
 /// The name of a place, and what tells its normals on both sides of a crease apart.
