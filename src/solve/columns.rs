@@ -283,7 +283,7 @@ impl Supernode<'_> {
 
 /// `x` + `a` `b`, rounded once where that is quick.
 #[inline(always)]
-fn multiply_add<S: Simd>(a: f64, b: f64, x: f64) -> f64 {
+pub(super) fn multiply_add<S: Simd>(a: f64, b: f64, x: f64) -> f64 {
     match S::IS_SCALAR {
         true => x + a * b,
         false => a.mul_add(b, x),

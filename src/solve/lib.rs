@@ -1,33 +1,38 @@
 //! The sparse symmetric solve: the only room that knows the linear-algebra crate.
 //!
 //! *Enters:* the pattern of a symmetric matrix, then its values as often as one likes. *Leaves:* solutions.
-//! The fill-reducing order (approximate minimum degree) and the symbolic factor are computed once a
-//! pattern; numeric factorisations reuse one value buffer and one workspace, so a Newton step allocates nothing.
-//! *Guaranteed:* the same bytes for any number of threads, because the factorisation is sequential:
-//! its loop over supernodes would not profit from more. *Not guaranteed:* accuracy beyond the condition number.
+//! The fill-reducing order (nested dissection where the matrix is large, approximate minimum degree) and the symbolic factor are computed once a
+//! pattern; numeric factorisations, [front by front](factor), write into one factor.
+//! *Guaranteed:* the same bytes for any number of threads. *Not guaranteed:* accuracy beyond the condition number.
 //!
 //! The factor is supernodal always: the crate's own threshold picks the simplicial one for small
 //! fill, which is slower above some ten thousand unknowns.
 
 mod columns;
+mod dissection;
+mod factor;
+mod front;
 
 pub use columns::{LANES, Row};
 
-use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
-use faer::linalg::cholesky::llt::factor::LltRegularization;
+use factor::Fronts;
+use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::perm::PermRef;
+use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
 use faer::sparse::linalg::{SupernodalThreshold, amd};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Accum, Conj, MatMut, MatRef, Par, Side, Spec};
+use faer::{Accum, Conj, MatMut, MatRef, Par, Side};
 
 /// Right sides that are solved at a time: enough that the factor is read from memory once for all of them.
 const BLOCK: usize = 16;
+
+/// Unknowns from which on a system is ordered by nested dissection: smaller ones are factorised about as quickly in an order of minimum degree, which costs less.
+const LARGE: usize = 100_000;
 
 /// Why a system could not be solved.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -85,13 +90,10 @@ fn columns_of<'a>(a: &'a [f64], b: &'a [f64], counts: [usize; 2]) -> [MatRef<'a,
 /// A symmetric positive definite matrix with a fixed pattern, and its Cholesky factor.
 pub struct SymmetricSolver {
     size: usize,
-    /// Columns of the lower triangle, diagonal first.
-    column: Vec<u32>,
-    row: Vec<u32>,
-    value: Vec<f64>,
-    /// Where the value of every off-diagonal pair is added.
-    slot: Vec<u32>,
+    /// Number of pairs.
+    pairs: usize,
     symbolic: SymbolicCholesky<u32>,
+    fronts: Fronts,
     factor: Vec<f64>,
     workspace: MemBuffer,
 }
@@ -155,25 +157,23 @@ impl SymmetricSolver {
             first[c + 1] += first[c];
         }
         let mut next = first.clone();
-        let mut by_column = vec![[0u32; 2]; pairs.len()];
-        for (p, [i, j]) in pairs.iter().enumerate() {
+        let mut by_column = vec![0u32; pairs.len()];
+        for [i, j] in pairs {
             let at = &mut next[*i.min(j) as usize];
-            by_column[*at as usize] = [*i.max(j), p as u32];
+            by_column[*at as usize] = *i.max(j);
             *at += 1;
         }
         let (mut column, mut row) = (Vec::with_capacity(size + 1), Vec::new());
         row.reserve(size + pairs.len());
-        let mut slot = vec![0; pairs.len()];
         for c in 0..size {
             column.push(row.len() as u32);
             row.push(c as u32);
             let entries = &mut by_column[first[c] as usize..first[c + 1] as usize];
             entries.sort_unstable();
-            for &mut [r, p] in entries {
+            for &mut r in entries {
                 if row.last() != Some(&r) {
                     row.push(r);
                 }
-                slot[p as usize] = row.len() as u32 - 1;
             }
         }
         column.push(row.len() as u32);
@@ -185,7 +185,6 @@ impl SymmetricSolver {
         let own;
         let ordering = match order {
             Order::Given(order) => SymmetricOrdering::Custom(order),
-            Order::LeastDegree { border: 0 } => SymmetricOrdering::Amd,
             Order::LeastDegree { border } => {
                 own = border_last(size, border, &column, &row).ok_or(too_large)?;
                 SymmetricOrdering::Custom(PermRef::new_checked(&own.0, &own.1, size))
@@ -197,22 +196,24 @@ impl SymmetricSolver {
         };
         let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, ordering, params)
             .map_err(|_| too_large)?;
-        let scratch = StackReq::or(
-            symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default()),
-            symbolic.solve_in_place_scratch::<f64>(BLOCK, Par::Seq),
-        );
+        let scratch = symbolic.solve_in_place_scratch::<f64>(BLOCK, Par::Seq);
         let workspace = MemBuffer::try_new(scratch).map_err(|_| too_large)?;
         factor.resize(symbolic.len_val(), 0.0);
         Ok(Self {
             size,
-            value: vec![0.0; row.len()],
-            column,
-            row,
-            slot,
+            pairs: pairs.len(),
+            fronts: Fronts::new(&symbolic, size, pairs),
             factor,
             symbolic,
             workspace,
         })
+    }
+
+    /// The same in a given order.
+    #[cfg(test)]
+    fn in_order(order: &[u32], place: &[u32], pairs: &[[u32; 2]]) -> Self {
+        let given = Order::Given(PermRef::new_checked(order, place, order.len()));
+        Self::ordered(order.len(), pairs, given).unwrap()
     }
 
     /// Number of unknowns.
@@ -225,40 +226,19 @@ impl SymmetricSolver {
         let failed = SolveError::NotPositiveDefinite {
             unknowns: self.size,
         };
-        self.value.fill(0.0);
-        for (&start, &d) in self.column.iter().zip(diagonal) {
-            self.value[start as usize] = d;
-        }
-        for (&slot, &w) in self.slot.iter().zip(off_diagonal) {
-            self.value[slot as usize] += w;
-        }
-        // The crate takes NaN pivots for what they are, but infinities may pass: look first.
-        if self.value.iter().any(|v| !v.is_finite()) {
-            return Err(failed);
-        }
         if self.size == 0 {
             return Ok(());
         }
-        let pattern = SymbolicSparseColMatRef::new_checked(
-            self.size,
-            self.size,
-            &self.column,
-            None,
-            &self.row,
-        );
-        let matrix = SparseColMatRef::new(pattern, &self.value);
-        self.symbolic
-            .factorize_numeric_llt(
-                &mut self.factor,
-                matrix,
-                Side::Lower,
-                LltRegularization::default(),
-                Par::Seq,
-                MemStack::new(&mut self.workspace),
-                Spec::default(),
-            )
-            .map(|_| ())
-            .map_err(|_| failed)
+        // NaN pivots are taken for what they are, but infinities may pass: look first.
+        let [diagonal, off_diagonal] = [&diagonal[..self.size], &off_diagonal[..self.pairs]];
+        let mut values = diagonal.iter().chain(off_diagonal);
+        if !values.all(|v| v.is_finite()) {
+            return Err(failed);
+        }
+        let factorised = self
+            .fronts
+            .factorize(&mut self.factor, diagonal, off_diagonal);
+        factorised.map_err(|_| failed)
     }
 
     /// Replaces `rhs` (one value an unknown, any number of right sides one after another) by the solutions, with the factor of the
@@ -315,7 +295,7 @@ fn border_last(size: usize, border: usize, column: &[u32], row: &[u32]) -> Optio
         inner.extend(rows.iter().copied().filter(|&r| (r as usize) < core));
     }
     first.push(inner.len() as u32);
-    let (mut order, mut place) = least_degree(&first, &inner)?;
+    let (mut order, mut place) = little_fill(&first, &inner)?;
     order.extend(core as u32..size as u32);
     place.extend(core as u32..size as u32);
     Some((order, place))
@@ -337,7 +317,7 @@ fn by_blocks(size: usize, width: usize, column: &[u32], row: &[u32]) -> Option<P
         }
     }
     first.push(inner.len() as u32);
-    let (order, place) = least_degree(&first, &inner)?;
+    let (order, place) = little_fill(&first, &inner)?;
     let unknowns = |blocks: Vec<u32>| {
         let each = blocks
             .into_iter()
@@ -347,8 +327,22 @@ fn by_blocks(size: usize, width: usize, column: &[u32], row: &[u32]) -> Option<P
     Some((unknowns(order), unknowns(place)))
 }
 
+/// An order of a lower triangle by columns in which the factor fills up little.
+fn little_fill(first: &[u32], row: &[u32]) -> Option<Permutation> {
+    let size = first.len() - 1;
+    let order = match size > LARGE {
+        true => dissection::order(first, row, &least_degree)?,
+        false => least_degree(first, row)?,
+    };
+    let mut place = vec![0; size];
+    for (i, &unknown) in order.iter().enumerate() {
+        place[unknown as usize] = i as u32;
+    }
+    Some((order, place))
+}
+
 /// Approximate minimum degree of a lower triangle by columns.
-fn least_degree(first: &[u32], row: &[u32]) -> Option<Permutation> {
+fn least_degree(first: &[u32], row: &[u32]) -> Option<Vec<u32>> {
     let size = first.len() - 1;
     let pattern = SymbolicSparseColMatRef::new_checked(size, size, first, None, row);
     let (mut order, mut place) = (vec![0; size], vec![0; size]);
@@ -362,7 +356,7 @@ fn least_degree(first: &[u32], row: &[u32]) -> Option<Permutation> {
         MemStack::new(&mut memory),
     )
     .ok()?;
-    Some((order, place))
+    Some(order)
 }
 
 #[cfg(test)]

@@ -48,6 +48,9 @@ struct Collector {
     rows: Vec<u32>,
 }
 
+/// Where the entries of each row begin, and column and place in it of each entry.
+pub(super) type ByRow = (Vec<u32>, Vec<(u32, u32)>);
+
 impl Columns {
     fn with_capacity(columns: usize, entries: usize) -> Self {
         let mut first = Vec::with_capacity(columns + 1);
@@ -89,8 +92,8 @@ impl Columns {
         product
     }
 
-    /// Entries by rows: where those of a row begin, and column and place in it of each.
-    pub(super) fn by_row(&self, rows: usize) -> (Vec<u32>, Vec<(u32, u32)>) {
+    /// Entries by rows.
+    pub(super) fn by_row(&self, rows: usize) -> ByRow {
         let mut first = vec![0u32; rows + 1];
         for &r in &self.row {
             first[r as usize + 1] += 1;

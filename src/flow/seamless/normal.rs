@@ -4,12 +4,14 @@
 //! loop is coupled with all vertices near it. So the loops come last in the elimination: rows that are long but few do not fill the rest.
 
 use super::SeamlessError;
-use super::jacobian::{Columns, most_products};
+use super::jacobian::{ByRow, Columns, most_products};
 use super::norm::Norm;
 use super::state::{Problem, State};
 use crate::flow::solve::SymmetricSolver;
 use crate::geometry::ids::{EdgeId, EdgeVec, NONE, VertexId};
 use crate::observe::part;
+use crate::parallel;
+use std::ops::Range;
 
 /// Shifts of the diagonal, relative to its mean, tried in turn until the matrix is positive definite.
 const SHIFTS: [f64; 4] = [1e-14, 1e-12, 1e-10, 1e-8];
@@ -123,17 +125,38 @@ fn check_density(by_edges: &Columns, edges: usize) -> Result<(), SeamlessError> 
     }
 }
 
+/// Rows that are summed by one thread.
+const ROWS: usize = 8192;
+
 impl Products {
     /// Σ w a aᵀ over the columns a of all parts, row by row (Gustavson 1978).
     fn new(equations: usize, parts: &[(&Columns, &[f64])]) -> Self {
         let by_row: Vec<_> = parts.iter().map(|part| part.0.by_row(equations)).collect();
+        let of_rows = parallel::map_numbers(equations.div_ceil(ROWS), |i| {
+            let rows = i * ROWS..equations.min((i + 1) * ROWS);
+            Self::of_rows(rows, parts, &by_row)
+        });
+        let mut all = Self {
+            pairs: Vec::with_capacity(of_rows.iter().map(|p| p.pairs.len()).sum()),
+            values: Vec::with_capacity(of_rows.iter().map(|p| p.pairs.len()).sum()),
+            diagonal: Vec::with_capacity(equations),
+        };
+        for rows in of_rows {
+            all.pairs.extend(rows.pairs);
+            all.values.extend(rows.values);
+            all.diagonal.extend(rows.diagonal);
+        }
+        all
+    }
+
+    fn of_rows(rows: Range<usize>, parts: &[(&Columns, &[f64])], by_row: &[ByRow]) -> Self {
         let (mut pairs, mut values) = (Vec::new(), Vec::new());
-        let mut diagonal = vec![0.0; equations];
-        let mut sum = vec![0.0; equations];
-        let mut met = vec![NONE; equations];
+        let mut diagonal = vec![0.0; rows.len()];
+        let mut sum = vec![0.0; rows.end];
+        let mut met = vec![NONE; rows.end];
         let mut coupled: Vec<u32> = Vec::new();
-        for (r, diagonal) in diagonal.iter_mut().enumerate() {
-            for ((columns, weight), (first, entries)) in parts.iter().zip(&by_row) {
+        for (r, diagonal) in rows.zip(&mut diagonal) {
+            for ((columns, weight), (first, entries)) in parts.iter().zip(by_row) {
                 for &(c, at) in &entries[first[r] as usize..first[r + 1] as usize] {
                     let (rows, values) = columns.column(c as usize);
                     let v = weight[c as usize] * values[at as usize];
