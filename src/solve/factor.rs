@@ -358,7 +358,7 @@ impl WithSimd for Branch<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let mut pivots = pivots();
+        let (mut pivots, mut spare) = (pivots(), Vec::new());
         let mut waiting = self.waiting;
         for (&s, own) in self.nodes.iter().zip(self.own) {
             let children = &self.fronts.child[self.fronts.children[s as usize].clone()];
@@ -371,6 +371,7 @@ impl WithSimd for Branch<'_> {
                 values: own,
                 children: updates.collect(),
                 pivots: &mut pivots,
+                spare: &mut spare,
                 is_shared: self.is_shared,
             };
             let update = front.with_simd(simd)?;
@@ -390,6 +391,8 @@ struct Front<'a> {
     values: &'a mut [f64],
     children: Vec<(u32, Update)>,
     pivots: &'a mut MemBuffer,
+    /// Memory to be used again.
+    spare: &'a mut Vec<Update>,
     is_shared: bool,
 }
 
@@ -405,10 +408,16 @@ impl WithSimd for Front<'_> {
         for &[entry, at] in &self.fronts.entries[node.entries.clone()] {
             own[at as usize] += self.matrix.value(entry);
         }
-        let mut update = vec![0.0; below * below];
+        let mut update = self.spare.pop().unwrap_or_default();
+        update.clear();
+        update.resize(below * below, 0.0);
         for (child, of_child) in self.children {
             let place = &self.fronts.place[self.fronts.nodes[child as usize].below.clone()];
             add(size, place, &of_child, own, &mut update);
+            // Thousands of small ones that come and go would leave the heap in pieces; large ones go back.
+            if !self.is_shared {
+                self.spare.push(of_child);
+            }
         }
         let is_large = size >= LARGE[0] && node.height() >= LARGE[1];
         let done = match is_large {
