@@ -10,7 +10,7 @@
 //!
 //! *Guaranteed:* a column has the same bytes whichever others are beside it.
 
-use super::SymmetricSolver;
+use super::{SymmetricSolver, registers};
 use faer::linalg::matmul::matmul;
 use faer::sparse::linalg::cholesky::SymbolicCholeskyRaw;
 use faer::{Accum, MatMut, MatRef, Par};
@@ -56,6 +56,7 @@ impl SymmetricSolver {
             solver: self,
             sides: columns,
         });
+        registers::free();
     }
 
     /// Replaces one right side, in the order of elimination, by the solution.

@@ -88,11 +88,6 @@ impl Fronts {
             of_column[start..start + node.size].fill(s as u32);
             start += node.size;
         }
-        // Where a row stands in a front.
-        let stands = |node: &Node, first: usize, row: usize| match row.checked_sub(first) {
-            Some(own) if own < node.size => own,
-            _ => node.size + rows[node.below.clone()].partition_point(|&r| (r as usize) < row),
-        };
         let mut place = vec![0; rows.len()];
         for s in 0..nodes.len() {
             let Some(&next) = rows[nodes[s].below.clone()].first() else {
@@ -119,27 +114,38 @@ impl Fronts {
             Some(order) => order.arrays().1[unknown as usize] as usize,
             None => unknown as usize,
         };
+        // Column and row of every value, by nodes.
         let entry = |[i, j]: [u32; 2]| {
             let (i, j) = (position(i), position(j));
-            let (column, row) = (i.min(j), i.max(j));
-            let s = of_column[column] as usize;
-            let node = &nodes[s];
-            let at = (column - first[s]) * node.height() + stands(node, first[s], row);
-            [s as u32, at as u32]
+            [i.min(j) as u32, i.max(j) as u32]
         };
         let diagonal = (0..size as u32).map(|i| [i; 2]);
         let all: Vec<[u32; 2]> = diagonal.chain(pairs.iter().copied()).map(entry).collect();
         let mut count = vec![0usize; nodes.len() + 1];
-        all.iter().for_each(|[s, _]| count[*s as usize + 1] += 1);
+        for [column, _] in &all {
+            count[of_column[*column as usize] as usize + 1] += 1;
+        }
         for s in 0..nodes.len() {
             count[s + 1] += count[s];
             nodes[s].entries = count[s]..count[s + 1];
         }
         let mut entries = vec![[0; 2]; all.len()];
-        for (i, [s, at]) in all.into_iter().enumerate() {
-            let next = &mut count[s as usize];
-            entries[*next] = [i as u32, at];
+        for (i, [column, _]) in all.iter().enumerate() {
+            let next = &mut count[of_column[*column as usize] as usize];
+            entries[*next][0] = i as u32;
             *next += 1;
+        }
+        // Where a row stands in the front at hand.
+        let mut stands = vec![0; size];
+        for (node, &first) in nodes.iter().zip(&first) {
+            (0..node.size).for_each(|k| stands[first + k] = k);
+            for (k, &row) in (node.size..).zip(&rows[node.below.clone()]) {
+                stands[row as usize] = k;
+            }
+            for [i, at] in &mut entries[node.entries.clone()] {
+                let [column, row] = all[*i as usize].map(|c| c as usize);
+                *at = ((column - first) * node.height() + stands[row]) as u32;
+            }
         }
         let mut fronts = Self {
             nodes,

@@ -3,6 +3,7 @@
 //! *Enters:* columns with rows, the diagonal block on top, and the square of the rows below, column after column. *Leaves:* the same columns of the factor, and the square without what they subtract. *Guaranteed:* the same bytes on any number of threads.
 
 use super::columns::multiply_add;
+use super::registers;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{
     LltRegularization, cholesky_in_place, cholesky_in_place_scratch,
@@ -132,6 +133,7 @@ pub(super) fn large(
             MemStack::new(pivots),
             Spec::default(),
         );
+        registers::free();
         let pivots = top.as_ref().diagonal().column_vector();
         if factorised.is_err() || !pivots.iter().all(|&x| is_pivot(x)) {
             return false;
@@ -165,6 +167,8 @@ fn subtract(rows: MatRef<'_, f64>, first: usize, columns: &mut [f64], height: us
     let (_, rows) = rows.split_at_row(first);
     let (own, _) = rows.split_at_row(count);
     matmul(into, Accum::Add, rows, own.transpose(), -1.0, Par::Seq);
+    // Blocks may have a thread of their own.
+    registers::free();
 }
 
 /// `f` of the number of the first column and of blocks of columns.
@@ -196,6 +200,7 @@ fn solve_rows(triangle: MatRef<'_, f64>, rows: MatMut<'_, f64>, is_shared: bool)
     if count <= ROWS {
         if count > 0 {
             solve_lower_triangular_in_place(triangle, rows.transpose_mut(), Par::Seq);
+            registers::free();
         }
         return;
     }

@@ -12,6 +12,7 @@ mod columns;
 mod dissection;
 mod factor;
 mod front;
+mod registers;
 
 pub use columns::{LANES, Row};
 
@@ -58,6 +59,7 @@ pub fn inner_products(a: &[f64], b: &[f64], counts: [usize; 2]) -> Vec<f64> {
     let mut products = vec![0.0; counts[0] * counts[1]];
     let into = MatMut::from_column_major_slice_mut(&mut products, counts[1], counts[0]);
     matmul(into, Accum::Replace, b.transpose(), a, 1.0, Par::Seq);
+    registers::free();
     products
 }
 
@@ -77,6 +79,7 @@ pub fn half_products(a: &[f64], b: &[f64], count: usize) -> Vec<f64> {
         1.0,
         Par::Seq,
     );
+    registers::free();
     products
 }
 
@@ -264,6 +267,7 @@ impl SymmetricSolver {
                 MemStack::new(&mut self.workspace),
             );
         }
+        registers::free();
     }
 }
 

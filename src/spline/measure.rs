@@ -4,7 +4,7 @@
 
 use super::gridded::Sample;
 use super::limit::Limit;
-use super::tessellation::{parts, triangles};
+use super::tessellation::{jets, parts, triangles, without_plane};
 use crate::geometry::mesh::{cross, dot, norm, sub};
 use crate::parallel;
 use rayon::prelude::*;
@@ -119,8 +119,15 @@ fn all(limit: &Limit<'_>) -> Vec<u32> {
 }
 
 fn each_of(limit: &Limit<'_>, cells: &[u32]) -> Vec<Cell> {
-    let irregular = limit.cage.irregular();
-    parallel::map(cells, |_, &cell| Cell::new(limit, cell, &irregular))
+    let (irregular, without) = (limit.cage.irregular(), without_plane(limit.cage));
+    parallel::map(cells, |_, &cell| {
+        let mut own = Cell::new(limit, cell, &irregular);
+        own.over = f64::max(
+            own.over,
+            own.area * away(limit, cell, without[cell as usize]),
+        );
+        own
+    })
 }
 
 /// The Jacobians of a cell.
@@ -164,17 +171,15 @@ impl Cell {
                 }
             }
         }
-        let over = f64::max(over, area * away(limit, cell));
         Self { area, over, least }
     }
 }
 
 /// Part of a cell whose triangles look away from the surface.
-fn away(limit: &Limit<'_>, cell: u32) -> f64 {
+fn away(limit: &Limit<'_>, cell: u32, without_plane: [bool; 4]) -> f64 {
     let parts = parts(limit.cage.cells.len());
     let row = parts + 1;
-    let places = (0..row * row).map(|i| [i % row, i / row].map(|x| x as f64 / parts as f64));
-    let jets: Vec<_> = places.map(|at| limit.normal(cell, at)).collect();
+    let jets = jets(limit, cell, parts, without_plane);
     let quads = (0..parts).flat_map(|j| (0..parts).map(move |i| row * j + i));
     let quads = quads.map(|at| [at, at + 1, at + row + 1, at + row]);
     let away = quads.filter(|&quad| triangles(&jets, quad).1 <= 0.0);

@@ -1,6 +1,6 @@
 //! The limit surface as triangles.
 //!
-//! *Enters:* a [`Limit`] surface and a number of parts along a side of a cell. *Leaves:* a [`Tessellation`]: points that cells share along their sides, and normals that they share but across creases.
+//! *Enters:* a [`Limit`] surface and a number of parts along a side of a cell. *Leaves:* a [`Tessellation`]: points that cells share along their sides, and normals that they share but across creases and at points without tangent plane.
 
 use super::cage::{Cage, CellSide};
 use super::evaluator::CORNER;
@@ -44,8 +44,59 @@ enum Name {
     Inside(u32, usize),
 }
 
-/// Of every corner of every cell, the first cell of those around the point that no crease divides from it.
-fn sectors(cage: &Cage) -> Vec<[u32; 4]> {
+/// Of every corner of every cell, whether the surface has no tangent plane there: at corners, and where more than two cells lie between creases.
+pub(super) fn without_plane(cage: &Cage) -> Vec<[bool; 4]> {
+    let creases = cage.creases();
+    let mut without = vec![[false; 4]; cage.cells.len()];
+    for (v, side) in cage.leaving().into_iter().enumerate() {
+        let Some(side) = side.filter(|_| cage.is_corner[v] || creases[v] > 0) else {
+            continue;
+        };
+        let mut star = cage.star(side);
+        let crease = star.iter().position(|&s| cage.is_crease(s));
+        star.rotate_left(crease.unwrap_or(0));
+        for sector in star.chunk_by(|_, &next| !cage.is_crease(next)) {
+            if cage.is_corner[v] || (crease.is_some() && sector.len() > 2) {
+                for &(c, k) in sector {
+                    without[c as usize][usize::from(k)] = true;
+                }
+            }
+        }
+    }
+    without
+}
+
+/// Points and normals at the ends of the parts of a cell, row by row. Where the surface has no tangent plane at a corner, `without`, the normal there is that of its part.
+pub(super) fn jets(
+    limit: &Limit<'_>,
+    cell: u32,
+    parts: usize,
+    without: [bool; 4],
+) -> Vec<([f64; 3], [f64; 3])> {
+    let row = parts + 1;
+    let places = (0..row * row).map(|i| [i % row, i / row].map(|x| x as f64 / parts as f64));
+    let mut jets: Vec<_> = places.map(|at| limit.normal(cell, at)).collect();
+    let last = row * row - 1;
+    // Corners, what comes next to each counterclockwise, and before it.
+    let corners = [
+        [0, 1, row],
+        [parts, parts + row, parts - 1],
+        [last, last - 1, last - row],
+        [last - parts, last - parts - row, last - parts + 1],
+    ];
+    for ([at, next, before], _) in corners.into_iter().zip(without).filter(|(_, is)| *is) {
+        let [a, b] = [next, before].map(|i| sub(jets[i].0, jets[at].0));
+        let normal = cross(a, b);
+        let length = norm(normal);
+        if length > 0.0 {
+            jets[at].1 = normal.map(|x| x / length);
+        }
+    }
+    jets
+}
+
+/// Of every corner of every cell, the first cell of those around the point that no crease divides from it; the cell itself where the surface has no tangent plane.
+fn sectors(cage: &Cage, without_plane: &[[bool; 4]]) -> Vec<[u32; 4]> {
     let mut first = vec![[u32::MAX; 4]; cage.cells.len()];
     for c in 0..cage.cells.len() as u32 {
         for k in 0..4u8 {
@@ -60,7 +111,8 @@ fn sectors(cage: &Cage) -> Vec<[u32; 4]> {
             let mut close = |sector: &mut Vec<CellSide>| {
                 let least = sector.iter().map(|s| s.0).min().unwrap_or(0);
                 for (c, k) in sector.drain(..) {
-                    first[c as usize][usize::from(k)] = least;
+                    let is_alone = without_plane[c as usize][usize::from(k)];
+                    first[c as usize][usize::from(k)] = if is_alone { c } else { least };
                 }
             };
             for side in star {
@@ -78,12 +130,11 @@ fn sectors(cage: &Cage) -> Vec<[u32; 4]> {
 /// Divides every cell into `parts`² parts.
 pub fn tessellate(limit: &Limit<'_>, parts: usize) -> Tessellation {
     let cage = limit.cage;
-    let sectors = sectors(cage);
+    let without_plane = without_plane(cage);
+    let sectors = sectors(cage, &without_plane);
     let row = parts + 1;
-    let place = |i: usize| [(i % row) as f64, (i / row) as f64].map(|x| x / parts as f64);
-    let jets: Vec<Vec<([f64; 3], [f64; 3])>> = parallel::map_numbers(cage.cells.len(), |c| {
-        let places = (0..row * row).map(place);
-        places.map(|at| limit.normal(c as u32, at)).collect()
+    let jets = parallel::map_numbers(cage.cells.len(), |c| {
+        jets(limit, c as u32, parts, without_plane[c])
     });
     let mut out = Tessellation {
         parts,

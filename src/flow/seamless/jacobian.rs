@@ -11,7 +11,8 @@
 use super::SeamlessError;
 use super::state::{Problem, State};
 use crate::flow::delaunay::PtolemyFlip;
-use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, Id, IdVec, NONE};
+use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, Id, IdVec, NONE, VertexId};
+use crate::parallel;
 
 /// Most products for each edge, of entries of T one flip after another or of the Jacobian by its transpose; ordinary meshes have about ten.
 const MOST_PRODUCTS_OF_EDGE: usize = 60;
@@ -51,15 +52,41 @@ struct Collector {
 /// Where the entries of each row begin, and column and place in it of each entry.
 pub(super) type ByRow = (Vec<u32>, Vec<(u32, u32)>);
 
+/// Columns that are worked out by one thread, at least, and parts that there are at most: each has a place for every row.
+const RUN: usize = 16_384;
+const MOST_RUNS: usize = 32;
+
 impl Columns {
-    fn with_capacity(columns: usize, entries: usize) -> Self {
-        let mut first = Vec::with_capacity(columns + 1);
-        first.push(0);
-        Self {
-            first,
+    /// So many columns of so many rows; `add` adds the entries of one.
+    fn new(columns: usize, rows: usize, add: impl Fn(usize, &mut Collector) + Sync) -> Self {
+        let run = RUN.max(columns.div_ceil(MOST_RUNS));
+        let parts = parallel::map_numbers(columns.div_ceil(run), |i| {
+            let mut part = Self {
+                first: vec![0],
+                ..Self::default()
+            };
+            let mut collector = Collector::new(rows);
+            for column in i * run..columns.min((i + 1) * run) {
+                add(column, &mut collector);
+                part.close(&mut collector);
+            }
+            part
+        });
+        let entries = parts.iter().map(|part| part.row.len()).sum();
+        let mut all = Self {
+            first: Vec::with_capacity(columns + 1),
             row: Vec::with_capacity(entries),
             value: Vec::with_capacity(entries),
+        };
+        all.first.push(0);
+        for part in parts {
+            let before = all.row.len() as u32;
+            all.first
+                .extend(part.first[1..].iter().map(|at| before + at));
+            all.row.extend(part.row);
+            all.value.extend(part.value);
         }
+        all
     }
 
     /// Rows and values of a column.
@@ -151,39 +178,32 @@ impl State {
         let flipped = FlippedRows::new(self, edges)?;
         let side = self.sides_of_features(problem);
         let (first, dependent) = flipped.by_edge(edges);
-        let mut columns = Columns::with_capacity(edges, 4 * edges + edges / 2);
-        let mut collector = Collector::new(problem.equations());
         let images = images(&problem.shares);
-        for e in c.edges() {
-            let column = e.index();
+        Ok(Columns::new(edges, problem.equations(), |column, sum| {
+            let e = EdgeId::new(column);
             let together = [Some(e), images[e]].into_iter().flatten();
             for part in together.filter(|_| problem.shares[e] == e) {
                 if flipped.number[part] == NONE {
-                    self.add_edge(problem, &side, part, 1.0, column, &mut collector);
+                    self.add_edge(problem, &side, part, 1.0, column, sum);
                 }
                 let range = first[part.index()] as usize..first[part.index() + 1] as usize;
                 for &(of, share) in &dependent[range] {
-                    self.add_edge(problem, &side, of, share, column, &mut collector);
+                    self.add_edge(problem, &side, of, share, column, sum);
                 }
             }
-            columns.close(&mut collector);
-        }
-        Ok(columns)
+        }))
     }
 
     /// ∂(angles)/∂u for a scale u at every vertex: a column a vertex.
     pub(super) fn by_scales(&self, problem: &Problem, by_edges: &Columns) -> Columns {
         let c = &self.connectivity;
-        let vertices = c.vertex_count();
-        let mut columns = Columns::with_capacity(vertices, 8 * vertices);
-        let mut collector = Collector::new(problem.equations());
         if !self.glued.is_empty() {
-            self.by_scales_of_edges(problem, by_edges, &mut columns, &mut collector);
-            return columns;
+            return self.by_scales_of_edges(problem, by_edges);
         }
         // Scales commute with flips by Ptolemy's theorem, so T is not needed.
         let images = images(&problem.vertex_shares);
-        for v in c.vertices() {
+        Columns::new(c.vertex_count(), problem.equations(), |column, sum| {
+            let v = VertexId::new(column);
             let together = [Some(v), images[v]].into_iter().flatten();
             let together = together.filter(|_| problem.vertex_shares[v] == v);
             for h in together.flat_map(|part| c.outgoing(part)) {
@@ -194,35 +214,27 @@ impl State {
                     true => -(weight[(k + 1) % 3] + weight[(k + 2) % 3]),
                     false => weight[3 - corner - k],
                 };
-                self.add_corners(problem, f, derivative, v.index(), &mut collector);
+                self.add_corners(problem, f, derivative, column, sum);
             }
-            columns.close(&mut collector);
-        }
-        columns
+        })
     }
 
     /// The same by the edges of the given triangulation at every vertex: those that move with others have empty columns.
-    fn by_scales_of_edges(
-        &self,
-        problem: &Problem,
-        by_edges: &Columns,
-        columns: &mut Columns,
-        collector: &mut Collector,
-    ) {
+    fn by_scales_of_edges(&self, problem: &Problem, by_edges: &Columns) -> Columns {
         let c = problem.base;
         let images = images(&problem.vertex_shares);
-        for v in c.vertices() {
+        Columns::new(c.vertex_count(), problem.equations(), |column, sum| {
+            let v = VertexId::new(column);
             let together = [Some(v), images[v]].into_iter().flatten();
             let together = together.filter(|_| problem.vertex_shares[v] == v);
             let ends = together.flat_map(|part| c.outgoing(part));
             for h in ends.filter(|&h| problem.shares[c.edge(h)] == c.edge(h)) {
                 let (rows, values) = by_edges.column(c.edge(h).index());
                 for (&r, &value) in rows.iter().zip(values) {
-                    collector.add(v.index(), r, value);
+                    sum.add(column, r, value);
                 }
             }
-            columns.close(collector);
-        }
+        })
     }
 
     /// The equation that an edge is a side of, and its sign there; `NONE` for others.

@@ -40,7 +40,7 @@ impl Normal {
         norm: &Norm,
         last: Option<Self>,
     ) -> Result<Self, SeamlessError> {
-        let _part = part!("Jacobian and factor");
+        let part = part!("Jacobian");
         let equations = problem.equations();
         let by_edges = state.by_edges(problem)?;
         let by_scales = norm.vertex.as_ref();
@@ -55,6 +55,8 @@ impl Normal {
             values,
             mut diagonal,
         } = Products::new(equations, &parts);
+        drop(part);
+        let part = part!("order of elimination");
         let loops = equations - problem.local_equations();
         // An order that is kept although edges were flipped lets the factor fill up: twice over for one edge in a hundred.
         let mut solver = match last {
@@ -62,6 +64,8 @@ impl Normal {
             Some(last) => last.solver.renewed(loops, &pairs)?,
             None => SymmetricSolver::with_border(equations, loops, &pairs)?,
         };
+        drop(part);
+        let _part = part!("factor");
         let mean = diagonal.iter().sum::<f64>() / equations.max(1) as f64;
         let mut shifted = 0.0;
         let mut result = Ok(());
