@@ -7,11 +7,11 @@ use crate::atlas::charts::ChartFace;
 use crate::export::EncodeError;
 use crate::flow::prescription::BoundaryCondition;
 use crate::geometry::ids::{EdgeId, FaceId, NONE, PatchId};
-use crate::grid::Grid;
+use crate::parallel;
 use crate::product::AffineAtlas;
-use std::io::{BufWriter, Seek, Write};
+use std::io::{BufWriter, Cursor, Seek, Write};
 use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, DateTime, ZipWriter};
+use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 /// Compressed bytes collected before they go on; entries are written value by value.
 const BUFFER_BYTES: usize = 1 << 16;
@@ -26,28 +26,33 @@ const LARGE_ENTRY_BYTES: u64 = 0xF000_0000;
 /// Magic string and version of a `.npy` file.
 const NPY_START: [u8; 8] = *b"\x93NUMPY\x01\x00";
 
-/// Writes the archive. Expects [`super::check_shapes`] to hold.
+/// Smaller arrays are not compressed: to begin with that takes longer than to write them.
+const SMALL_ENTRY_BYTES: u64 = 4096;
+
+/// Part of the archive in memory.
+type Part = Archive<Cursor<Vec<u8>>>;
+
+/// Writes the archive, whose parts are compressed side by side. Expects [`super::check_shapes`] to hold.
 pub fn write<W: Write + Seek>(atlas: &AffineAtlas, writer: W) -> Result<(), EncodeError> {
-    let mut archive = Archive {
-        zip: ZipWriter::new(writer),
-    };
-    surface(atlas, &mut archive)?;
-    central_chart(atlas, &mut archive)?;
-    charts(atlas, &mut archive)?;
-    patches(atlas, &mut archive)?;
-    seams(atlas, &mut archive)?;
-    if let Some(found) = &atlas.grid {
-        grid(found, &mut archive)?;
+    let sections = [surface, central_chart, charts, patches, seams, grid];
+    let parts = parallel::map(&sections, |_, section| {
+        let mut part = Archive {
+            zip: ZipWriter::new(Cursor::new(Vec::new())),
+        };
+        section(atlas, &mut part)?;
+        part.zip.finish().map_err(zip_error)
+    });
+    let mut zip = ZipWriter::new(writer);
+    for part in parts {
+        let part = ZipArchive::new(part?).map_err(zip_error)?;
+        zip.merge_archive(part).map_err(zip_error)?;
     }
-    let mut writer = archive.zip.finish().map_err(zip_error)?;
+    let mut writer = zip.finish().map_err(zip_error)?;
     writer.flush()?;
     Ok(())
 }
 
-fn surface<W: Write + Seek>(
-    atlas: &AffineAtlas,
-    archive: &mut Archive<W>,
-) -> Result<(), EncodeError> {
+fn surface(atlas: &AffineAtlas, archive: &mut Part) -> Result<(), EncodeError> {
     let mesh = &atlas.mesh;
     let connectivity = &mesh.connectivity;
     let (v, f) = (connectivity.vertex_count(), connectivity.face_count());
@@ -70,10 +75,7 @@ fn surface<W: Write + Seek>(
     archive.finite("target_curvature", &[v], curvature)
 }
 
-fn central_chart<W: Write + Seek>(
-    atlas: &AffineAtlas,
-    archive: &mut Archive<W>,
-) -> Result<(), EncodeError> {
+fn central_chart(atlas: &AffineAtlas, archive: &mut Part) -> Result<(), EncodeError> {
     let f = atlas.mesh.connectivity.face_count();
     let lengths = opposite_edges(atlas).map(|e| atlas.metric.length[e]);
     archive.finite("flat_length", &[f, 3], lengths)?;
@@ -99,10 +101,7 @@ fn opposite_edges(atlas: &AffineAtlas) -> impl Iterator<Item = EdgeId> + '_ {
         .flat_map(|f: FaceId| connectivity.face_edges(f))
 }
 
-fn charts<W: Write + Seek>(
-    atlas: &AffineAtlas,
-    archive: &mut Archive<W>,
-) -> Result<(), EncodeError> {
+fn charts(atlas: &AffineAtlas, archive: &mut Part) -> Result<(), EncodeError> {
     let charts = &atlas.charts.charts;
     let offset = offsets(charts.iter().map(|c| c.faces.len()))?;
     let n = charts.iter().map(|c| c.faces.len()).sum();
@@ -114,10 +113,7 @@ fn charts<W: Write + Seek>(
     archive.finite("chart_uv", &[n, 3, 2], uv)
 }
 
-fn patches<W: Write + Seek>(
-    atlas: &AffineAtlas,
-    archive: &mut Archive<W>,
-) -> Result<(), EncodeError> {
+fn patches(atlas: &AffineAtlas, archive: &mut Part) -> Result<(), EncodeError> {
     let layout = &atlas.patches;
     let f = layout.face_patch.len();
     let patch = layout.face_patch.iter().map(|p| p.raw());
@@ -126,10 +122,7 @@ fn patches<W: Write + Seek>(
     archive.finite("patch_uv", &[f, 3, 2], uv)
 }
 
-fn seams<W: Write + Seek>(
-    atlas: &AffineAtlas,
-    archive: &mut Archive<W>,
-) -> Result<(), EncodeError> {
+fn seams(atlas: &AffineAtlas, archive: &mut Part) -> Result<(), EncodeError> {
     let seams = &atlas.patches.seams;
     let offset = offsets(seams.iter().map(|s| s.samples.len()))?;
     let m = seams.iter().map(|s| s.samples.len()).sum();
@@ -163,7 +156,10 @@ fn seams<W: Write + Seek>(
     archive.array("seam_patch", &[seams.len(), 2], sides)
 }
 
-fn grid<W: Write + Seek>(grid: &Grid, archive: &mut Archive<W>) -> Result<(), EncodeError> {
+fn grid(atlas: &AffineAtlas, archive: &mut Part) -> Result<(), EncodeError> {
+    let Some(grid) = &atlas.grid else {
+        return Ok(());
+    };
     let f = grid.uv.len();
     let uv = grid.uv.iter().flatten().flatten().copied();
     archive.finite("grid_uv", &[f, 3, 2], uv)?;
@@ -259,9 +255,13 @@ impl<W: Write + Seek> Archive<W> {
     ) -> Result<BufWriter<&mut ZipWriter<W>>, EncodeError> {
         let count: usize = shape.iter().product();
         let bytes = count as u64 * size as u64;
+        let (method, level) = match bytes < SMALL_ENTRY_BYTES {
+            true => (CompressionMethod::Stored, None),
+            false => (CompressionMethod::Deflated, Some(COMPRESSION_LEVEL)),
+        };
         let options = SimpleFileOptions::default()
-            .compression_method(CompressionMethod::Deflated)
-            .compression_level(Some(COMPRESSION_LEVEL))
+            .compression_method(method)
+            .compression_level(level)
             .last_modified_time(DateTime::default())
             .unix_permissions(0o644)
             .system(zip::System::Unix)

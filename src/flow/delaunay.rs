@@ -275,8 +275,9 @@ impl Delaunay {
     }
 
     fn flip_all(&mut self, u: &VertexVec<f64>, shape: &mut FaceVec<FaceShape>, diagonal: Diagonal) {
-        let wrong = |e: &EdgeId| self.is_wrong(u, shape, *e);
-        let wrong = self.connectivity.edges().filter(wrong).collect();
+        let edges = (0..self.connectivity.edge_count()).into_par_iter();
+        let wrong = edges.with_min_len(PIECE).map(EdgeId::new);
+        let wrong = wrong.filter(|&e| self.is_wrong(u, shape, e)).collect();
         self.flip_from(wrong, u, shape, diagonal);
     }
 

@@ -11,12 +11,13 @@
 
 use super::density::Units;
 use super::error::GridError;
-use super::map::{Corners, Freedom, GridMap, Turning};
+use super::map::{Corners, GridMap, Turning};
 use super::quads::QuadMesh;
+use super::spots::{Spot, locate, normals};
 use super::squares::Squares;
 use super::system::{Derivatives, Equations};
 use super::triangle::double_area;
-use crate::geometry::ids::{FaceId, VertexId, VertexVec};
+use crate::geometry::ids::{FaceId, VertexId};
 use crate::geometry::mesh::{cross, dot, norm, sub};
 use crate::observe::part;
 use rayon::prelude::*;
@@ -39,26 +40,8 @@ const REACH: f64 = 0.4;
 const MOST_HALVINGS: usize = 12;
 /// Part of its area on the grid that a face keeps in a step.
 const KEPT: f64 = 0.1;
-/// Weight below which a corner of a face has no part in a point.
-const NO_WEIGHT: f64 = 1e-9;
-/// Vertices a piece of work has at least.
+/// Vertices or faces that a piece of work has at least.
 const PIECE: usize = 1024;
-
-/// A point of the quad mesh on the surface. Vectors are seen from the square that it was found in.
-#[derive(Clone, Copy)]
-struct Spot {
-    position: [f64; 3],
-    normal: [f64; 3],
-    /// Where it goes by a step along either axis.
-    tangent: [[f64; 3]; 2],
-    is_free: [bool; 2],
-    /// The square, and its corner there.
-    corner: (u32, u8),
-    /// Side of a cell, source units.
-    size: f64,
-    /// Of the face that it was found in: the thickest counts.
-    thickness: f64,
-}
 
 /// A corner of a cell: the point there, the next and the previous.
 fn corner(q: &[u32; 4], k: usize) -> [u32; 3] {
@@ -271,7 +254,9 @@ fn without_harm(
         !(new >= KEPT * old && new > 0.0)
     };
     let c = &map.sheet.fine.connectivity;
-    let mut faces: BTreeSet<FaceId> = c.faces().filter(|&f| harmed(f, &moved)).collect();
+    let all: Vec<FaceId> = c.faces().collect();
+    let all = all.into_par_iter().with_min_len(PIECE);
+    let mut faces: BTreeSet<FaceId> = all.filter(|&f| harmed(f, &moved)).collect();
     for k in 1.. {
         if faces.is_empty() {
             break;
@@ -334,129 +319,6 @@ fn follow(
         [0, 1].map(|a| if free[a] { sum[a] } else { 0.0 })
     });
     of_vertex.collect()
-}
-
-/// Where points lie; `None` where one is not found.
-fn locate<'a>(
-    map: &GridMap,
-    mesh: &'a QuadMesh,
-    normals: &VertexVec<[f64; 3]>,
-    unit: &Units,
-) -> Option<(Squares<'a>, Vec<Spot>)> {
-    let (sheet, c) = (&map.sheet, &map.sheet.fine.connectivity);
-    let squares = Squares::new(map, mesh)?;
-    let mut spots: Vec<Option<Spot>> = vec![None; mesh.points.len()];
-    for f in c.faces() {
-        let p = map.corners(f);
-        let whole = double_area(p);
-        let thickness = super::triangle::thickness(p);
-        let range = |i: usize| {
-            let of = p.map(|p| p[i]);
-            let low = of[0].min(of[1]).min(of[2]) - NO_WEIGHT;
-            let high = of[0].max(of[1]).max(of[2]) + NO_WEIGHT;
-            low.ceil() as i64..=high.floor() as i64
-        };
-        for x in range(0) {
-            for y in range(1) {
-                let q = [x as f64, y as f64];
-                let weights = [
-                    double_area([q, p[1], p[2]]) / whole,
-                    double_area([p[0], q, p[2]]) / whole,
-                    double_area([p[0], p[1], q]) / whole,
-                ];
-                if weights.iter().any(|w| *w < -NO_WEIGHT) {
-                    continue;
-                }
-                let seen = squares.at(f, q);
-                let Some(corner) = seen.corner_at([x, y]) else {
-                    continue;
-                };
-                let point = mesh.quads[seen.square as usize][usize::from(corner)] as usize;
-                if spots[point].is_some_and(|s| s.thickness >= thickness) {
-                    continue;
-                }
-                let vertices = c.face_vertices(f);
-                let at = vertices.map(|v| sheet.fine.position[v]);
-                let mixed = |of: [[f64; 3]; 3]| -> [f64; 3] {
-                    std::array::from_fn(|i| (0..3).map(|k| weights[k] * of[k][i]).sum())
-                };
-                let (e, g) = (sub(at[1], at[0]), sub(at[2], at[0]));
-                let (u, w) = (
-                    [p[1][0] - p[0][0], p[1][1] - p[0][1]],
-                    [p[2][0] - p[0][0], p[2][1] - p[0][1]],
-                );
-                // The direction in the frame of the face that an axis of the square has.
-                let tangent = |axis: usize| {
-                    let unit = [[1.0, 0.0], [0.0, 1.0]][axis];
-                    let [x, y] = super::complex::turned(unit, 4 - seen.corner);
-                    let (s, t) = ((x * w[1] - y * w[0]) / whole, (y * u[0] - x * u[1]) / whole);
-                    std::array::from_fn(|i| s * e[i] + t * g[i])
-                };
-                let free = freedom(map, f, weights);
-                let turned = usize::from(seen.corner & 1);
-                let normal = mixed(vertices.map(|v| normals[v]));
-                let length = norm(normal);
-                if length == 0.0 {
-                    return None;
-                }
-                spots[point] = Some(Spot {
-                    position: mixed(at),
-                    normal: normal.map(|x| x / length),
-                    tangent: [tangent(0), tangent(1)],
-                    is_free: [free[turned], free[1 - turned]],
-                    corner: (seen.square, corner),
-                    size: unit.of(sheet.fine.parent[f]),
-                    thickness,
-                });
-            }
-        }
-    }
-    let spots = spots.into_iter().collect::<Option<Vec<_>>>()?;
-    Some((squares, spots))
-}
-
-/// Whether a point of a face may move along the axes of its frame: on lines only along them.
-fn freedom(map: &GridMap, f: FaceId, weights: [f64; 3]) -> [bool; 2] {
-    let c = &map.sheet.fine.connectivity;
-    let halfedges = c.face_halfedges(f);
-    let has = weights.map(|w| w > NO_WEIGHT);
-    let of_corner = |k: usize| {
-        let v = c.tail(halfedges[k]);
-        let axes = map.freedom[v].axes();
-        let turns = map.frames(v).into_iter().find(|t| t.0 == halfedges[k]);
-        match turns.is_some_and(|t| t.1 & 1 == 1) {
-            true => [axes[1], axes[0]],
-            false => axes,
-        }
-    };
-    let beside: Vec<usize> = (0..3).filter(|&k| has[k]).collect();
-    match beside[..] {
-        [k] => of_corner(k),
-        [j, k] => {
-            let is_line = [j, k].map(|k| map.freedom[c.tail(halfedges[k])] != Freedom::Free);
-            let [p, q] = [j, k].map(|k| map.sheet.at(halfedges[k]));
-            match is_line == [true; 2] {
-                true => [p[1] == q[1], p[0] == q[0]],
-                false => [true; 2],
-            }
-        }
-        _ => [true; 2],
-    }
-}
-
-/// Normals of vertices, weighted by area.
-fn normals(map: &GridMap) -> VertexVec<[f64; 3]> {
-    let (c, position) = (&map.sheet.fine.connectivity, &map.sheet.fine.position);
-    let mut normals = VertexVec::filled([0.0; 3], c.vertex_count());
-    for f in c.faces() {
-        let vertices = c.face_vertices(f);
-        let [p, q, r] = vertices.map(|v| position[v]);
-        let own = cross(sub(q, p), sub(r, p));
-        for v in vertices {
-            (0..3).for_each(|i| normals[v][i] += own[i]);
-        }
-    }
-    normals
 }
 
 #[cfg(test)]

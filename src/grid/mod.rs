@@ -28,6 +28,7 @@ mod regions;
 mod relax;
 pub(crate) mod sheet;
 pub(crate) mod slivers;
+mod spots;
 mod squares;
 mod squeezed;
 mod system;
