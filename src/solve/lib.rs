@@ -8,6 +8,7 @@
 //! The factor is supernodal always: the crate's own threshold picks the simplicial one for small
 //! fill, which is slower above some ten thousand unknowns.
 
+mod bisection;
 mod columns;
 mod dissection;
 mod factor;
@@ -16,6 +17,7 @@ mod registers;
 
 pub use columns::{LANES, Row};
 
+use dissection::Division;
 use factor::Fronts;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::matmul::matmul;
@@ -96,6 +98,8 @@ pub struct SymmetricSolver {
     /// Number of pairs.
     pairs: usize,
     symbolic: SymbolicCholesky<u32>,
+    /// Empty where no parts were ordered by themselves.
+    division: Division,
     fronts: Fronts,
     factor: Vec<f64>,
     workspace: MemBuffer,
@@ -131,21 +135,23 @@ impl SymmetricSolver {
         )
     }
 
-    /// [`with_border`](Self::with_border) for another pattern of as many unknowns, in the memory of this one.
+    /// [`with_border`](Self::with_border) for another pattern of as many unknowns, in the memory of this one. Of a large pattern the parts are kept that are ordered by themselves, as far as no entry leads from one to another.
     pub fn renewed(self, border: usize, pairs: &[[u32; 2]]) -> Result<Self, SolveError> {
-        Self::with_memory(self.size, pairs, Order::LeastDegree { border }, self.factor)
+        let order = Order::LeastDegree { border };
+        Self::with_memory(self.size, pairs, order, self.factor, self.division)
     }
 
     fn ordered(size: usize, pairs: &[[u32; 2]], order: Order<'_>) -> Result<Self, SolveError> {
-        Self::with_memory(size, pairs, order, Vec::new())
+        Self::with_memory(size, pairs, order, Vec::new(), Vec::new())
     }
 
-    /// `factor`: memory to be used again.
+    /// `factor`: memory to be used again; `division`: that of a similar pattern.
     fn with_memory(
         size: usize,
         pairs: &[[u32; 2]],
         order: Order<'_>,
         mut factor: Vec<f64>,
+        mut division: Division,
     ) -> Result<Self, SolveError> {
         let too_large = SolveError::TooLarge { unknowns: size };
         if size >= u32::MAX as usize / 2 || pairs.len() >= u32::MAX as usize / 2 {
@@ -189,7 +195,8 @@ impl SymmetricSolver {
         let ordering = match order {
             Order::Given(order) => SymmetricOrdering::Custom(order),
             Order::LeastDegree { border } => {
-                own = border_last(size, border, &column, &row).ok_or(too_large)?;
+                let found = border_last(size, border, &column, &row, &mut division);
+                own = found.ok_or(too_large)?;
                 SymmetricOrdering::Custom(PermRef::new_checked(&own.0, &own.1, size))
             }
             Order::Blocks { width } => {
@@ -208,6 +215,7 @@ impl SymmetricSolver {
             fronts: Fronts::new(&symbolic, size, pairs),
             factor,
             symbolic,
+            division,
             workspace,
         })
     }
@@ -289,7 +297,13 @@ type Permutation = (Vec<u32>, Vec<u32>);
 
 /// Approximate minimum degree of the leading block, then the last `border` unknowns. `column` and `row` are the lower triangle by columns,
 /// ascending. `None` where memory does not suffice.
-fn border_last(size: usize, border: usize, column: &[u32], row: &[u32]) -> Option<Permutation> {
+fn border_last(
+    size: usize,
+    border: usize,
+    column: &[u32],
+    row: &[u32],
+    division: &mut Division,
+) -> Option<Permutation> {
     let core = size.saturating_sub(border);
     let mut first = Vec::with_capacity(core + 1);
     let mut inner = Vec::with_capacity(row.len());
@@ -299,7 +313,7 @@ fn border_last(size: usize, border: usize, column: &[u32], row: &[u32]) -> Optio
         inner.extend(rows.iter().copied().filter(|&r| (r as usize) < core));
     }
     first.push(inner.len() as u32);
-    let (mut order, mut place) = little_fill(&first, &inner)?;
+    let (mut order, mut place) = little_fill(&first, &inner, division)?;
     order.extend(core as u32..size as u32);
     place.extend(core as u32..size as u32);
     Some((order, place))
@@ -321,7 +335,7 @@ fn by_blocks(size: usize, width: usize, column: &[u32], row: &[u32]) -> Option<P
         }
     }
     first.push(inner.len() as u32);
-    let (order, place) = little_fill(&first, &inner)?;
+    let (order, place) = little_fill(&first, &inner, &mut Vec::new())?;
     let unknowns = |blocks: Vec<u32>| {
         let each = blocks
             .into_iter()
@@ -332,10 +346,10 @@ fn by_blocks(size: usize, width: usize, column: &[u32], row: &[u32]) -> Option<P
 }
 
 /// An order of a lower triangle by columns in which the factor fills up little.
-fn little_fill(first: &[u32], row: &[u32]) -> Option<Permutation> {
+fn little_fill(first: &[u32], row: &[u32], division: &mut Division) -> Option<Permutation> {
     let size = first.len() - 1;
     let order = match size > LARGE {
-        true => dissection::order(first, row, &least_degree)?,
+        true => dissection::order(first, row, division, &least_degree)?,
         false => least_degree(first, row)?,
     };
     let mut place = vec![0; size];

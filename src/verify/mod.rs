@@ -360,20 +360,46 @@ fn check_arrays(
     let (shapes, angles) = shapes::Shapes::new(arrays);
     let metric = metric::check(&surface, arrays, document, angles, options, verdicts);
     let slit = central::check(&surface, arrays, document, options, verdicts);
-    transitions::check(&surface, arrays, document, &slit, &metric, verdicts);
-    features::check(&surface, arrays, document, &slit, verdicts);
-    charts::check(&surface, arrays, document, &slit, verdicts);
-    if let Some(source) = source {
-        source::check(arrays, document, source, verdicts);
-    }
-    quality::check(arrays, document, &shapes, verdicts);
-    let groups = patches::check(
-        &surface, arrays, document, &shapes, options, &slit, verdicts,
-    );
-    if let Some(groups) = groups {
-        images::check(folder, arrays, document, &groups, verdicts);
-        packed::check(folder, document, verdicts);
-        seams::check(&surface, arrays, document, &groups, verdicts);
-        lattice::check(folder, &surface, arrays, document, verdicts);
-    }
+    let of_charts = |verdicts: &mut Verdicts| {
+        transitions::check(&surface, arrays, document, &slit, &metric, verdicts);
+        features::check(&surface, arrays, document, &slit, verdicts);
+        charts::check(&surface, arrays, document, &slit, verdicts);
+        if let Some(source) = source {
+            source::check(arrays, document, source, verdicts);
+        }
+        quality::check(arrays, document, &shapes, verdicts);
+    };
+    let of_patches = |verdicts: &mut Verdicts| {
+        let groups = patches::check(
+            &surface, arrays, document, &shapes, options, &slit, verdicts,
+        );
+        let Some(groups) = groups else { return };
+        let of_images = |verdicts: &mut Verdicts| {
+            images::check(folder, arrays, document, &groups, verdicts);
+            packed::check(folder, document, verdicts);
+        };
+        let of_sides = |verdicts: &mut Verdicts| {
+            seams::check(&surface, arrays, document, &groups, verdicts);
+            lattice::check(folder, &surface, arrays, document, verdicts);
+        };
+        side_by_side(verdicts, of_images, of_sides);
+    };
+    side_by_side(verdicts, of_charts, of_patches);
+}
+
+/// Notes what both find, that of the first before that of the second.
+fn side_by_side(
+    verdicts: &mut Verdicts,
+    first: impl FnOnce(&mut Verdicts) + Send,
+    second: impl FnOnce(&mut Verdicts) + Send,
+) {
+    let (first, second) = rayon::join(|| of(first), || of(second));
+    verdicts.checks.extend(first.checks);
+    verdicts.checks.extend(second.checks);
+}
+
+fn of(check: impl FnOnce(&mut Verdicts)) -> Verdicts {
+    let mut verdicts = Verdicts::default();
+    check(&mut verdicts);
+    verdicts
 }
