@@ -23,10 +23,13 @@ pub(crate) struct Spacing {
     elsewhere: f64,
 }
 
+/// Places for cones on the smallest parts of a file: four times as many as a tetrahedron needs.
+const FEWEST: f64 = 32.0;
+
 /// Those of a first attempt, for a number of cells, and of others where float64 does not hold what comes of the first: as wide everywhere, as close, wider; with the last a mesh stays as it is.
 pub(crate) fn spacings(cells: usize) -> Vec<Spacing> {
     // About a cell and two cells, but for small parts of a file and for very fine grids.
-    let of = |cells: f64, most| 1.0 / cells.clamp(100.0, most);
+    let of = |cells: f64, most| 1.0 / cells.clamp(FEWEST, most);
     let close = of(0.8 * cells as f64, 1600.0);
     let wide = of(0.2 * cells as f64, 400.0);
     let all = [

@@ -1,9 +1,11 @@
 use super::cage::{Cage, CellSide, Kind};
 use super::evaluator::Evaluator;
 use super::limit::Limit;
+use super::measure;
 use super::subdivide::subdivide;
-use super::tessellation::tessellate;
+use super::tessellation::{parts, tessellate, without_plane};
 use crate::geometry::connectivity::Connectivity;
+use crate::geometry::mesh::{cross, dot, sub};
 
 /// Numbers without pattern between 0 and 1.
 fn noise(mut state: u64) -> impl FnMut() -> f64 {
@@ -337,4 +339,40 @@ fn triangles_share_their_points() {
             }
         }
     }
+}
+
+/// Where the measure finds no fold, triangles look the way of the normals at their corners; cells share normals but across creases and at points without tangent plane.
+#[test]
+fn triangles_look_along_normals() {
+    let mut whole = 0;
+    for (n, (cage, points)) in cages().into_iter().enumerate() {
+        let evaluator = Evaluator::new(&cage);
+        let limit = Limit::new(&cage, &evaluator, &points);
+        let triangles = tessellate(&limit, parts(cage.cells.len()));
+        let away = triangles.smooth_faces.iter().filter(|face| {
+            let corners = face.map(|v| triangles.vertices[v as usize]);
+            let [p, q, r] = corners.map(|(point, _)| triangles.points[point as usize]);
+            let own = cross(sub(q, p), sub(r, p));
+            corners.iter().any(|(_, normal)| dot(own, *normal) <= 0.0)
+        });
+        if measure::shape(&limit).turned_over == 0.0 {
+            assert_eq!(away.count(), 0, "cage {n}");
+            whole += 1;
+        }
+        let without = without_plane(&cage);
+        let count = |v: usize| {
+            let sides = (0..cage.cells.len()).flat_map(|c| [0, 1, 2, 3].map(|k| (c, k)));
+            let at = sides.filter(|&(c, k)| cage.cells[c][k] as usize == v);
+            at.filter(|&(c, k)| without[c][k]).count()
+        };
+        let corners = cage.is_corner.iter().enumerate().filter(|(_, is)| **is);
+        for (v, _) in corners {
+            let limit_point = points[v];
+            let normals = triangles.vertices.iter();
+            let normals = normals
+                .filter(|(p, _)| distance(triangles.points[*p as usize], limit_point) < 1e-9);
+            assert_eq!(normals.count(), count(v), "cage {n}, corner {v}");
+        }
+    }
+    assert!(whole >= 2, "{whole}");
 }
