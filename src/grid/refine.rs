@@ -25,6 +25,8 @@ pub(crate) struct Spacing {
 
 /// Places for cones on the smallest parts of a file: four times as many as a tetrahedron needs.
 const FEWEST: f64 = 32.0;
+/// The spacing of a hundred.
+const ENOUGH: f64 = 0.01;
 
 /// Those of a first attempt, for a number of cells, and of others where float64 does not hold what comes of the first: as wide everywhere, as close, wider; with the last a mesh stays as it is.
 pub(crate) fn spacings(cells: usize) -> Vec<Spacing> {
@@ -34,6 +36,8 @@ pub(crate) fn spacings(cells: usize) -> Vec<Spacing> {
     let wide = of(0.2 * cells as f64, 400.0);
     let all = [
         [close, wide],
+        // On small parts they may be too few.
+        [wide.min(ENOUGH); 2],
         [wide; 2],
         [0.25 * wide; 2],
         [4.0 * wide; 2],
