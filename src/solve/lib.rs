@@ -19,23 +19,24 @@ pub use columns::{LANES, Row};
 
 use dissection::Division;
 use factor::Fronts;
-use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::perm::PermRef;
-use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
 use faer::sparse::linalg::{SupernodalThreshold, amd};
-use faer::{Accum, Conj, MatMut, MatRef, Par, Side};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::{Accum, Conj, MatMut, MatRef, Par, Side, Spec};
 
 /// Right sides that are solved at a time: enough that the factor is read from memory once for all of them.
 const BLOCK: usize = 16;
 
-/// Unknowns from which on a system is ordered by nested dissection: smaller ones are factorised about as quickly in an order of minimum degree, which costs less.
-const LARGE: usize = 100_000;
+/// Unknowns (or blocks of them) above which a system is large: ordered by nested dissection and factorised front by front, on all threads. With one thread smaller ones take the crate as long in an order of minimum degree, which costs less.
+const LARGE: usize = 120_000;
 
 /// Why a system could not be solved.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -95,14 +96,29 @@ fn columns_of<'a>(a: &'a [f64], b: &'a [f64], counts: [usize; 2]) -> [MatRef<'a,
 /// A symmetric positive definite matrix with a fixed pattern, and its Cholesky factor.
 pub struct SymmetricSolver {
     size: usize,
-    /// Number of pairs.
-    pairs: usize,
     symbolic: SymbolicCholesky<u32>,
     /// Empty where no parts were ordered by themselves.
     division: Division,
-    fronts: Fronts,
+    numeric: Numeric,
     factor: Vec<f64>,
     workspace: MemBuffer,
+}
+
+/// How values become a factor.
+enum Numeric {
+    /// By the crate.
+    Whole(Columns),
+    /// Front by front, of so many pairs.
+    Fronts(Fronts, usize),
+}
+
+/// The matrix by columns of its lower triangle, diagonal first.
+struct Columns {
+    first: Vec<u32>,
+    row: Vec<u32>,
+    value: Vec<f64>,
+    /// Where the value of every off-diagonal pair is added.
+    slot: Vec<u32>,
 }
 
 impl SymmetricSolver {
@@ -166,34 +182,39 @@ impl SymmetricSolver {
             first[c + 1] += first[c];
         }
         let mut next = first.clone();
-        let mut by_column = vec![0u32; pairs.len()];
-        for [i, j] in pairs {
+        let mut by_column = vec![[0u32; 2]; pairs.len()];
+        for (p, [i, j]) in pairs.iter().enumerate() {
             let at = &mut next[*i.min(j) as usize];
-            by_column[*at as usize] = *i.max(j);
+            by_column[*at as usize] = [*i.max(j), p as u32];
             *at += 1;
         }
         let (mut column, mut row) = (Vec::with_capacity(size + 1), Vec::new());
         row.reserve(size + pairs.len());
+        let mut slot = vec![0; pairs.len()];
         for c in 0..size {
             column.push(row.len() as u32);
             row.push(c as u32);
             let entries = &mut by_column[first[c] as usize..first[c + 1] as usize];
             entries.sort_unstable();
-            for &mut r in entries {
+            for &mut [r, p] in entries {
                 if row.last() != Some(&r) {
                     row.push(r);
                 }
+                slot[p as usize] = row.len() as u32 - 1;
             }
         }
         column.push(row.len() as u32);
+        drop(by_column);
         let pattern = SymbolicSparseColMatRef::new_checked(size, size, &column, None, &row);
         let params = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
         };
+        let is_large = order.is_large(size);
         let own;
         let ordering = match order {
             Order::Given(order) => SymmetricOrdering::Custom(order),
+            Order::LeastDegree { border: 0 } if !is_large => SymmetricOrdering::Amd,
             Order::LeastDegree { border } => {
                 let found = border_last(size, border, &column, &row, &mut division);
                 own = found.ok_or(too_large)?;
@@ -206,13 +227,25 @@ impl SymmetricSolver {
         };
         let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, ordering, params)
             .map_err(|_| too_large)?;
-        let scratch = symbolic.solve_in_place_scratch::<f64>(BLOCK, Par::Seq);
+        let mut scratch = symbolic.solve_in_place_scratch::<f64>(BLOCK, Par::Seq);
+        let numeric = match is_large {
+            true => Numeric::Fronts(Fronts::new(&symbolic, size, pairs), pairs.len()),
+            false => {
+                let own = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
+                scratch = StackReq::or(scratch, own);
+                Numeric::Whole(Columns {
+                    first: column,
+                    value: vec![0.0; row.len()],
+                    row,
+                    slot,
+                })
+            }
+        };
         let workspace = MemBuffer::try_new(scratch).map_err(|_| too_large)?;
         factor.resize(symbolic.len_val(), 0.0);
         Ok(Self {
             size,
-            pairs: pairs.len(),
-            fronts: Fronts::new(&symbolic, size, pairs),
+            numeric,
             factor,
             symbolic,
             division,
@@ -224,7 +257,25 @@ impl SymmetricSolver {
     #[cfg(test)]
     fn in_order(order: &[u32], place: &[u32], pairs: &[[u32; 2]]) -> Self {
         let given = Order::Given(PermRef::new_checked(order, place, order.len()));
-        Self::ordered(order.len(), pairs, given).unwrap()
+        Self::ordered(order.len(), pairs, given)
+            .unwrap()
+            .in_fronts(pairs)
+    }
+
+    /// The same, factorised front by front whatever its size.
+    #[cfg(test)]
+    fn in_fronts(mut self, pairs: &[[u32; 2]]) -> Self {
+        let fronts = Fronts::new(&self.symbolic, self.size, pairs);
+        self.numeric = Numeric::Fronts(fronts, pairs.len());
+        self
+    }
+
+    #[cfg(test)]
+    fn fronts(&self) -> &Fronts {
+        match &self.numeric {
+            Numeric::Fronts(fronts, _) => fronts,
+            Numeric::Whole(_) => panic!("by the crate"),
+        }
     }
 
     /// Number of unknowns.
@@ -240,16 +291,33 @@ impl SymmetricSolver {
         if self.size == 0 {
             return Ok(());
         }
-        // NaN pivots are taken for what they are, but infinities may pass: look first.
-        let [diagonal, off_diagonal] = [&diagonal[..self.size], &off_diagonal[..self.pairs]];
-        let mut values = diagonal.iter().chain(off_diagonal);
-        if !values.all(|v| v.is_finite()) {
-            return Err(failed);
-        }
-        let factorised = self
-            .fronts
-            .factorize(&mut self.factor, diagonal, off_diagonal);
-        factorised.map_err(|_| failed)
+        let factorised = match &mut self.numeric {
+            Numeric::Fronts(fronts, pairs) => {
+                // NaN pivots are taken for what they are, but infinities may pass: look first.
+                let [diagonal, off_diagonal] = [&diagonal[..self.size], &off_diagonal[..*pairs]];
+                let mut values = diagonal.iter().chain(off_diagonal);
+                if !values.all(|v| v.is_finite()) {
+                    return Err(failed);
+                }
+                let done = fronts.factorize(&mut self.factor, diagonal, off_diagonal);
+                done.map_err(|_| failed)
+            }
+            Numeric::Whole(matrix) => {
+                let matrix = matrix.with(diagonal, off_diagonal).ok_or(failed)?;
+                let done = self.symbolic.factorize_numeric_llt(
+                    &mut self.factor,
+                    matrix,
+                    Side::Lower,
+                    LltRegularization::default(),
+                    Par::Seq,
+                    MemStack::new(&mut self.workspace),
+                    Spec::default(),
+                );
+                done.map(|_| ()).map_err(|_| failed)
+            }
+        };
+        registers::free();
+        factorised
     }
 
     /// Replaces `rhs` (one value an unknown, any number of right sides one after another) by the solutions, with the factor of the
@@ -279,6 +347,30 @@ impl SymmetricSolver {
     }
 }
 
+impl Columns {
+    /// With new values; `None` where one is no finite number.
+    fn with(
+        &mut self,
+        diagonal: &[f64],
+        off_diagonal: &[f64],
+    ) -> Option<SparseColMatRef<'_, u32, f64>> {
+        self.value.fill(0.0);
+        for (&start, &d) in self.first.iter().zip(diagonal) {
+            self.value[start as usize] = d;
+        }
+        for (&slot, &w) in self.slot.iter().zip(off_diagonal) {
+            self.value[slot as usize] += w;
+        }
+        if self.value.iter().any(|v| !v.is_finite()) {
+            return None;
+        }
+        let size = self.first.len() - 1;
+        let pattern =
+            SymbolicSparseColMatRef::new_checked(size, size, &self.first, None, &self.row);
+        Some(SparseColMatRef::new(pattern, &self.value))
+    }
+}
+
 /// In which order unknowns are eliminated.
 enum Order<'a> {
     /// Approximate minimum degree, but for the last `border` unknowns, which come last.
@@ -290,6 +382,18 @@ enum Order<'a> {
         width: usize,
     },
     Given(PermRef<'a, u32>),
+}
+
+impl Order<'_> {
+    /// Whether a system of so many unknowns is large.
+    fn is_large(&self, size: usize) -> bool {
+        let count = match *self {
+            Order::LeastDegree { border } => size.saturating_sub(border),
+            Order::Blocks { width } => size / width,
+            Order::Given(_) => size,
+        };
+        count > LARGE
+    }
 }
 
 /// A permutation and its inverse.

@@ -109,7 +109,7 @@ fn work(column: &[u32], row: &[u32], order: &[u32]) -> f64 {
     let all = (0..order.len()).flat_map(|c| of_column(c).iter().map(move |&r| [c as u32, r]));
     let pairs: Vec<[u32; 2]> = all.filter(|[c, r]| c != r).collect();
     let solver = SymmetricSolver::in_order(order, &place, &pairs);
-    solver.fronts.work()
+    solver.fronts().work()
 }
 
 /// Every thousandth vertex gets an edge to one some rows on, over and over.

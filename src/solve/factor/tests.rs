@@ -85,12 +85,14 @@ fn factors_are_those_of_the_crate() {
             Order::Given(given),
         ];
         for order in orders.into_iter().take(if side > 40 { 2 } else { 3 }) {
-            let mut solver = SymmetricSolver::ordered(size, &pairs, order).unwrap();
+            let mut solver = SymmetricSolver::ordered(size, &pairs, order)
+                .unwrap()
+                .in_fronts(&pairs);
             solver.factorize(&diagonal, &off).unwrap();
             let expected = of_crate(&solver, &pairs, &diagonal, &off);
             // The triangle above the diagonal is not looked at.
             let mut compared = 0;
-            for node in &solver.fronts.nodes {
+            for node in &solver.fronts().nodes {
                 for j in 0..node.size {
                     let column = node.value.start + j * node.height();
                     for at in column + j..column + node.height() {
@@ -111,10 +113,12 @@ fn factors_are_those_of_the_crate() {
 #[test]
 fn factors_have_the_same_bytes_on_any_number_of_threads() {
     let (pairs, diagonal, off) = torus(150);
-    let mut solver = SymmetricSolver::new(diagonal.len(), &pairs).unwrap();
-    assert!(solver.fronts.branches.len() > 8 && solver.fronts.above.len() > 3);
-    let is_shared = |&s: &u32| solver.fronts.nodes[s as usize].work() >= SHARED;
-    assert!(solver.fronts.above.iter().any(is_shared));
+    let mut solver = SymmetricSolver::new(diagonal.len(), &pairs)
+        .unwrap()
+        .in_fronts(&pairs);
+    assert!(solver.fronts().branches.len() > 8 && solver.fronts().above.len() > 3);
+    let is_shared = |&s: &u32| solver.fronts().nodes[s as usize].work() >= SHARED;
+    assert!(solver.fronts().above.iter().any(is_shared));
     let mut factors = [1, 2, 5].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
         let pool = pool.build().unwrap();
@@ -132,7 +136,9 @@ fn factors_have_the_same_bytes_on_any_number_of_threads() {
 #[test]
 fn pivots_that_are_not_positive_are_found_wherever_they_are() {
     let (pairs, diagonal, off) = torus(70);
-    let mut solver = SymmetricSolver::new(diagonal.len(), &pairs).unwrap();
+    let mut solver = SymmetricSolver::new(diagonal.len(), &pairs)
+        .unwrap()
+        .in_fronts(&pairs);
     for at in (0..diagonal.len()).step_by(97) {
         let mut diagonal = diagonal.clone();
         diagonal[at] = -1.0;

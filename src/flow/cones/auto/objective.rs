@@ -15,8 +15,8 @@ use crate::flow::solve::{half_products, inner_products};
 
 /// Newton steps at most.
 const STEPS: usize = 40;
-/// Steps that are made where nearly nothing is left; each leaves a tenth to a third, since the model of stars is not exact.
-const LAST_STEPS: usize = 8;
+/// Steps that are made where nearly nothing is left.
+const LAST_STEPS: usize = 3;
 /// Gain of a step, relative to the objective, after which it is the last: of curvatures that stay …
 pub(super) const SETTLED: f64 = 1e-9;
 /// … and of those that are only compared.
