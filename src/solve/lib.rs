@@ -2,7 +2,7 @@
 //!
 //! *Enters:* the pattern of a symmetric matrix, then its values as often as one likes. *Leaves:* solutions.
 //! The fill-reducing order (nested dissection where the matrix is large, approximate minimum degree) and the symbolic factor are computed once a
-//! pattern; numeric factorisations, front by front, write into one factor.
+//! pattern; numeric factorisations, those of large matrices front by front, write into one factor.
 //! *Guaranteed:* the same bytes for any number of threads. *Not guaranteed:* accuracy beyond the condition number.
 //!
 //! The factor is supernodal always: the crate's own threshold picks the simplicial one for small
