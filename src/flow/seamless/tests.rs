@@ -13,7 +13,7 @@ use crate::flow::signature::{FULL_TURN, Infeasible};
 use crate::flow::solve::SymmetricSolver;
 use crate::geometry::ids::{EdgeId, FaceId, FaceVec, HalfedgeId, VertexId, VertexVec};
 use crate::geometry::triangle;
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 mod borders;
 mod lines;
@@ -307,6 +307,39 @@ fn many_handles_are_no_obstacle() {
             metric.history.len() - 1
         );
     }
+}
+
+/// A torus of whose vertices every fifth or so nearly coincides with another, as vertices do that marching cubes make.
+fn with_thin_faces() -> Shape {
+    let [n, m] = [36, 20];
+    let mut random = shapes::sequence(71);
+    let number = |i: usize, j: usize| ((i % n) * m + j % m) as u32;
+    let mut positions = Vec::new();
+    let mut faces = Vec::new();
+    for i in 0..n {
+        for j in 0..m {
+            let aside = match random() < 0.2 {
+                true => 1.0 - 10.0_f64.powf(-1.0 - 5.0 * random()),
+                false => 0.3 * random(),
+            };
+            let [s, t] = [(i as f64 + aside) / n as f64, j as f64 / m as f64].map(|x| TAU * x);
+            let r = 2.0 + (0.8 + 0.2 * (3.0 * s).sin()) * t.cos();
+            positions.push([r * s.cos(), r * s.sin(), 0.8 * t.sin()]);
+            let [a, b, c, d] =
+                [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]].map(|[i, j]| number(i, j));
+            faces.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    Shape::new("thin faces", &faces, &positions)
+}
+
+#[test]
+fn thin_faces_do_not_shorten_steps() {
+    let prepared = prepare(&with_thin_faces());
+    let metric = prepared.solve(&SeamlessParams::default()).unwrap();
+    prepared.assert_seamless(&metric);
+    let steps = &metric.history[1..];
+    assert!(steps.len() <= 8, "{steps:?}");
 }
 
 /// By how much the change of λ is none of scales: least squares, edges weighed by area.
