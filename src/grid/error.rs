@@ -185,7 +185,10 @@ impl GridError {
     pub(crate) fn is_of_thin_faces(&self) -> bool {
         matches!(
             self,
-            Self::NoTriangle { .. } | Self::Lost { .. } | Self::NoQuarterTurn { .. }
+            Self::NoTriangle { .. }
+                | Self::Lost { .. }
+                | Self::NoQuarterTurn { .. }
+                | Self::TurnedOver { .. }
         )
     }
 }

@@ -190,6 +190,7 @@ fn made(
         Err(e @ (GridError::TurnedOver { .. } | GridError::Lost { .. })) => e,
         made => return made,
     };
+    tracing::debug!(%error, "again with other numbers of cells");
     let another = |&part: &f64| of_part(part).ok();
     TARGETS.iter().find_map(another).ok_or(error)
 }

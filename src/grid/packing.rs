@@ -4,6 +4,7 @@
 //! numbers, so the result is the same everywhere.
 
 use crate::parallel;
+use rustc_hash::FxHashMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Squares of the raster along a side of the square, about, at most.
@@ -33,12 +34,14 @@ pub(super) struct Packed {
 }
 
 /// Rows of an island that are alike, from the first to before the last, and their columns, from the first to before the last.
+#[derive(PartialEq, Eq, Hash)]
 struct Band {
     rows: [usize; 2],
     runs: Vec<[usize; 2]>,
 }
 
 /// An island on the raster.
+#[derive(PartialEq, Eq, Hash)]
 struct Mask {
     size: [usize; 2],
     /// From the one with the longest run on: what it does not fit need not be asked of others.
@@ -97,6 +100,12 @@ impl Mask {
         Self { size, bands }
     }
 
+    /// Columns that its longest run needs, in a row.
+    fn needed(&self) -> usize {
+        let runs = self.bands.first().map_or(&[][..], |band| &band.runs);
+        runs.iter().map(|[from, to]| to - from).max().unwrap_or(0)
+    }
+
     /// Squares of the raster.
     fn area(&self) -> usize {
         let of_band = |band: &Band| {
@@ -112,24 +121,64 @@ type Placed = ([usize; 2], bool);
 
 /// Rows of bits, 64 a word.
 struct Rows {
+    width: usize,
     words: usize,
     bits: Vec<u64>,
+    /// The longest run that is not taken, of every row.
+    free: Vec<usize>,
 }
 
 impl Rows {
+    fn new(width: usize) -> Self {
+        Self {
+            width,
+            words: width.div_ceil(64) + 1,
+            bits: Vec::new(),
+            free: Vec::new(),
+        }
+    }
+
     fn row(&self, y: usize) -> Option<&[u64]> {
         self.bits.get(y * self.words..(y + 1) * self.words)
     }
 
-    fn set(&mut self, y: usize, [from, to]: [usize; 2]) {
-        let needed = (y + 1) * self.words;
-        if self.bits.len() < needed {
-            self.bits.resize(needed, 0);
+    /// Takes a mask's squares, moved by `at`.
+    fn take(&mut self, mask: &Mask, [x, y]: [usize; 2]) {
+        let needed = y + mask.size[1];
+        if self.free.len() < needed {
+            self.bits.resize(needed * self.words, 0);
+            self.free.resize(needed, self.width);
         }
-        for x in from..to {
-            self.bits[y * self.words + x / 64] |= 1 << (x % 64);
+        for band in &mask.bands {
+            for r in y + band.rows[0]..y + band.rows[1] {
+                let row = &mut self.bits[r * self.words..][..self.words];
+                for i in band.runs.iter().flat_map(|&[from, to]| x + from..x + to) {
+                    row[i / 64] |= 1 << (i % 64);
+                }
+                self.free[r] = longest_free(row, self.width);
+            }
         }
     }
+}
+
+/// The longest run of zeros among the first `width` bits.
+fn longest_free(row: &[u64], width: usize) -> usize {
+    let (mut longest, mut run, mut x) = (0, 0, 0);
+    while x < width {
+        let rest = row[x / 64] >> (x % 64);
+        let left = (64 - x % 64).min(width - x);
+        let zeros = (rest.trailing_zeros() as usize).min(left);
+        run += zeros;
+        longest = longest.max(run);
+        if zeros < left {
+            run = 0;
+            let ones = ((rest >> zeros).trailing_ones() as usize).min(left - zeros);
+            x += zeros + ones;
+        } else {
+            x += zeros;
+        }
+    }
+    longest
 }
 
 /// What a row, moved to lower places by `by`, has in word `i`.
@@ -142,9 +191,10 @@ fn moved(row: &[u64], by: usize, i: usize) -> u64 {
     }
 }
 
-/// The lowest, then leftmost place of a mask in a square of this width, where nothing is higher than what is taken.
-fn place(taken: &Rows, mask: &Mask, width: usize, below: usize) -> Option<[usize; 2]> {
-    let last = width.checked_sub(mask.size[0])?;
+/// The lowest, then leftmost place of a mask from row `from` on, where nothing is higher than what is taken.
+fn place(taken: &Rows, mask: &Mask, from: usize, below: usize) -> Option<[usize; 2]> {
+    let last = taken.width.checked_sub(mask.size[0])?;
+    let (first, needed) = (mask.bands.first()?, mask.needed());
     // Bits beyond the last place count as taken.
     let beyond = |i: usize| match (last + 1).saturating_sub(64 * i) {
         0 => u64::MAX,
@@ -154,7 +204,16 @@ fn place(taken: &Rows, mask: &Mask, width: usize, below: usize) -> Option<[usize
     let none: Vec<u64> = (0..=last / 64).map(beyond).collect();
     let mut blocked = none.clone();
     let (mut joined, mut spread) = (vec![0u64; taken.words], vec![0u64; taken.words]);
-    for y in 0..=below {
+    let mut next = from;
+    while next <= below {
+        let y = next;
+        // Beyond the highest row without room for the longest run.
+        let rows = y + first.rows[0]..(y + first.rows[1]).min(taken.free.len());
+        if let Some(full) = rows.rev().find(|&r| taken.free[r] < needed) {
+            next = full + 1 - first.rows[0];
+            continue;
+        }
+        next += 1;
         blocked.copy_from_slice(&none);
         for band in &mask.bands {
             joined.fill(0);
@@ -196,27 +255,26 @@ fn strip(
     most: &AtomicUsize,
 ) -> Option<(Vec<Placed>, usize)> {
     let mut places = vec![([0; 2], false); masks.len()];
-    let mut taken = Rows {
-        words: width.div_ceil(64) + 1,
-        bits: Vec::new(),
-    };
+    let mut taken = Rows::new(width);
+    // The row where a mask found its place: the next one alike finds none below.
+    let mut lowest: FxHashMap<&Mask, usize> = FxHashMap::default();
     let mut height = 0;
     for &i in order {
-        let found = [false, true].into_iter().filter_map(|is_turned| {
+        let mut best = None;
+        for is_turned in [false, true] {
             let mask = &masks[i][usize::from(is_turned)];
-            let [x, y] = place(&taken, mask, width, height)?;
-            Some(((y + mask.size[1], y, x), is_turned))
-        });
-        // Every island fits into the strip lying down, above all that is taken.
-        let Some(((top, y, x), is_turned)) = found.min() else {
-            continue;
-        };
-        for band in &masks[i][usize::from(is_turned)].bands {
-            for r in band.rows[0]..band.rows[1] {
-                let runs = band.runs.iter();
-                runs.for_each(|&[from, to]| taken.set(y + r, [x + from, x + to]));
+            let from = lowest.get(mask).copied().unwrap_or(0);
+            if let Some([x, y]) = place(&taken, mask, from, height) {
+                lowest.insert(mask, y);
+                let found = ((y + mask.size[1], y, x), is_turned);
+                best = Some(best.map_or(found, |best| found.min(best)));
             }
         }
+        // Every island fits into the strip lying down, above all that is taken.
+        let Some(((top, y, x), is_turned)) = best else {
+            continue;
+        };
+        taken.take(&masks[i][usize::from(is_turned)], [x, y]);
         places[i] = ([x, y], is_turned);
         height = height.max(top);
         if height > most.load(Ordering::Relaxed) {
@@ -334,6 +392,76 @@ mod tests {
             own.into_iter().for_each(|at: usize| taken[at] += 1);
         }
         taken.iter().any(|&n| n > 1)
+    }
+
+    #[test]
+    fn the_longest_free_run_is_that_of_a_count_bit_by_bit() {
+        let mut state = 11u64;
+        for round in 0..500 {
+            let mut row = [0u64; 4];
+            let words = row.iter_mut();
+            // Sparse, dense and whole words.
+            words.for_each(|word| {
+                let mut next = || {
+                    state = state.wrapping_mul(6364136223846793005).wrapping_add(99);
+                    (state >> 32) << 32 | state.rotate_left(17) >> 32
+                };
+                *word = match round % 4 {
+                    0 => next() & next() & next() & next() & next(),
+                    1 => next() | next() | next(),
+                    2 if next() % 2 == 0 => 0,
+                    2 => u64::MAX,
+                    _ => next() & next(),
+                };
+            });
+            let width = 1 + (state >> 33) as usize % 256;
+            let is_free = |x: &usize| row[x / 64] >> (x % 64) & 1 == 0;
+            let all: Vec<usize> = (0..width).collect();
+            let runs = all.chunk_by(|a, b| is_free(a) == is_free(b));
+            let free = runs.filter(|run| is_free(&run[0])).map(<[_]>::len);
+            assert_eq!(longest_free(&row, width), free.max().unwrap_or(0));
+        }
+    }
+
+    #[test]
+    fn a_place_is_the_lowest_of_all() {
+        let mask = |rows: &[&str]| Mask::new(&outline(rows), false, 1, 0, 1);
+        let masks = [
+            mask(&["####"]),
+            mask(&["##.", ".##"]),
+            mask(&["###", "#.."]),
+            mask(&["#", "#", "#"]),
+            mask(&["#.#", "###"]),
+        ];
+        let mut taken = Rows::new(70);
+        for round in 0..400 {
+            let mask = &masks[round * round % 5];
+            let height = taken.free.len();
+            let squares = |[x, y]: [usize; 2]| {
+                let rows = |b: &Band| {
+                    (b.rows[0]..b.rows[1])
+                        .map(|r| (r, b.runs.clone()))
+                        .collect()
+                };
+                let rows: Vec<(usize, Vec<[usize; 2]>)> =
+                    mask.bands.iter().flat_map::<Vec<_>, _>(rows).collect();
+                let of_row = move |(r, runs): (usize, Vec<[usize; 2]>)| {
+                    let columns = runs.into_iter().flat_map(|[from, to]| from..to);
+                    columns.map(move |c| [x + c, y + r]).collect::<Vec<_>>()
+                };
+                rows.into_iter().flat_map(of_row)
+            };
+            let is_taken = |[x, y]: [usize; 2]| {
+                taken
+                    .row(y)
+                    .is_some_and(|row| row[x / 64] >> (x % 64) & 1 == 1)
+            };
+            let mut all = (0..=height).flat_map(|y| (0..=70 - mask.size[0]).map(move |x| [x, y]));
+            let lowest = all.find(|&at| !squares(at).any(is_taken));
+            let found = place(&taken, mask, 0, height);
+            assert_eq!(found, lowest);
+            taken.take(mask, found.unwrap());
+        }
     }
 
     #[test]

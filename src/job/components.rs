@@ -52,31 +52,96 @@ pub(super) struct Part<'a> {
     observer: &'a dyn Observer,
 }
 
+/// A way to build a component on a grid.
+struct Way {
+    spacing: Spacing,
+    config: Config,
+    /// Whether it is for surfaces one of whose grids was built and refused.
+    for_refused: bool,
+}
+
 impl Part<'_> {
     /// Its atlas, of flat patches where a grid cannot be made.
     pub fn atlas(&self) -> Result<AffineAtlas, BuildError> {
-        let spaced = |spacing| self.built(&self.requests, &self.config, spacing, None);
-        // Other triangles may do. What else is wrong with a grid stays so.
-        let may_do = |atlas: &Result<_, BuildError>| matches!(atlas, Err(BuildError::Grid(error)) if error.is_of_thin_faces());
-        let mut atlas = spaced(self.spacings()[0]);
-        if may_do(&atlas) {
-            for spacing in self.other_spacings() {
-                atlas = spaced(spacing);
-                if !may_do(&atlas) {
-                    break;
+        self.accepted(|atlas| Ok(Ok(atlas)))?
+    }
+
+    /// What `accept` makes of the first atlas that it takes: on its grid; on others, where faces are too thin for that one or it is not taken; at last of flat patches. The inner error is that of
+    /// the component, and the first of them; the outer one ends the job.
+    pub fn accepted<T>(
+        &self,
+        mut accept: impl FnMut(AffineAtlas) -> Result<Result<T, BuildError>, BuildError>,
+    ) -> Result<Result<T, BuildError>, BuildError> {
+        let mut first = None;
+        let mut is_refused = false;
+        for way in self.ways() {
+            if way.for_refused && !is_refused {
+                continue;
+            }
+            let error = match self.built(&self.requests, &way.config, way.spacing, None) {
+                Ok(atlas) => {
+                    let has_grid = atlas.grid.is_some();
+                    match accept(atlas)? {
+                        Err(error) if has_grid => {
+                            is_refused = true;
+                            error
+                        }
+                        taken => return Ok(taken),
+                    }
+                }
+                Err(BuildError::Cancelled) => return Err(BuildError::Cancelled),
+                Err(error) => {
+                    // Other triangles may do. What else is wrong with a grid stays so.
+                    let may_do = matches!(&error, BuildError::Grid(e) if e.is_of_thin_faces());
+                    if !may_do && !is_refused {
+                        first.get_or_insert(error);
+                        break;
+                    }
+                    error
+                }
+            };
+            tracing::debug!(%error, "again on another grid, or on flat patches");
+            first.get_or_insert(error);
+        }
+        match first {
+            Some(reason) if self.component.mesh.is_ok() && self.config.domain() == Domain::Grid => {
+                match self.without_grid(reason.to_string()) {
+                    Ok(atlas) => accept(atlas),
+                    Err(BuildError::Cancelled) => Err(BuildError::Cancelled),
+                    Err(error) => Ok(Err(error)),
                 }
             }
+            Some(error) => Ok(Err(error)),
+            None => Ok(Err(BuildError::Cancelled)),
         }
-        match atlas {
-            Err(error)
-                if !matches!(error, BuildError::Cancelled)
-                    && self.component.mesh.is_ok()
-                    && self.config.domain() == Domain::Grid =>
-            {
-                self.without_grid(error.to_string())
+    }
+
+    /// Grids one after the other: with fewer vertices, with more, whose triangles are less thin, and with its own; then, where one was refused, with more cells, whose lines leave no slivers where those
+    /// of fewer did, and without sharp edges as lines.
+    fn ways(&self) -> impl Iterator<Item = Way> {
+        let first = self.spacings()[0];
+        let (mut more, mut smooth) = (self.config.clone(), self.config.clone());
+        more.grid.cells = (1.1 * more.grid.cells as f64).round() as usize;
+        smooth.features.angle = 180.0;
+        let way = |for_refused| {
+            move |(spacing, config)| Way {
+                spacing,
+                config,
+                for_refused,
             }
-            atlas => atlas,
-        }
+        };
+        let is_grid = self.config.domain() == Domain::Grid;
+        let others = move || match is_grid {
+            true => self.other_spacings(),
+            false => Vec::new(),
+        };
+        // Found out only where they are needed.
+        let spacings = std::iter::once(first).chain(std::iter::once_with(others).flatten());
+        let spaced = spacings.map(|spacing| (spacing, self.config.clone()));
+        let last = [more, smooth].map(|config| (first, config));
+        spaced
+            .map(way(false))
+            .chain(last.into_iter().map(way(true)))
     }
 
     /// Those of new vertices, at first and where that fails.
@@ -103,21 +168,8 @@ impl Part<'_> {
         spacings.split_off(1)
     }
 
-    /// Builds it on other grids, one after the other: with fewer vertices, with more, whose triangles are less thin, and with its own; then with more cells, whose lines leave no slivers where those
-    /// of fewer did, and without sharp edges as lines.
-    pub fn on_other_grids(&self) -> impl Iterator<Item = Result<AffineAtlas, BuildError>> {
-        let (mut more, mut smooth) = (self.config.clone(), self.config.clone());
-        more.grid.cells = (1.1 * more.grid.cells as f64).round() as usize;
-        smooth.features.angle = 180.0;
-        let spacings = self.other_spacings().into_iter();
-        let spaced = spacings.map(|spacing| (spacing, self.config.clone()));
-        let others = [more, smooth].map(|config| (self.spacings()[0], config));
-        let ways = spaced.chain(others);
-        ways.map(|(spacing, config)| self.built(&self.requests, &config, spacing, None))
-    }
-
     /// Builds it of flat patches, for this reason.
-    pub fn without_grid(&self, reason: String) -> Result<AffineAtlas, BuildError> {
+    fn without_grid(&self, reason: String) -> Result<AffineAtlas, BuildError> {
         let (requests, config) = &self.flat;
         self.built(requests, config, self.spacings()[0], Some(reason))
     }

@@ -102,45 +102,25 @@ impl<'a> Publication<'a> {
             shown,
             is_missing: false,
         };
-        let mut atlas = match part.atlas() {
-            Ok(atlas) => atlas,
-            Err(BuildError::Cancelled) => return Err(BuildError::Cancelled),
+        let mut is_missing = true;
+        let accepted = part.accepted(|mut atlas| {
+            is_missing = false;
+            let shown = self.add(index, components, &mut atlas, config)?;
+            Ok(shown.map(|shown| (atlas, shown)))
+        })?;
+        let (atlas, shown) = match accepted {
+            Ok(accepted) => accepted,
             Err(error) => {
                 return Ok(Published {
-                    is_missing: true,
+                    is_missing,
                     ..published(Err(error), Vec::new(), None)
                 });
             }
         };
-        let mut added = self.add(index, components, &mut atlas, config)?;
-        if let (Err(error), true) = (&added, atlas.grid.is_some()) {
-            let reason = error.to_string();
-            let grids = part.on_other_grids();
-            let flat = std::iter::once_with(|| part.without_grid(reason));
-            for other in grids.chain(flat) {
-                if let Err(error) = &added {
-                    tracing::debug!(%error, "again on another grid, or on flat patches");
-                }
-                match other {
-                    Err(BuildError::Cancelled) => return Err(BuildError::Cancelled),
-                    Err(error) => added = Err(error),
-                    Ok(other) => {
-                        atlas = other;
-                        added = self.add(index, components, &mut atlas, config)?;
-                    }
-                }
-                if added.is_ok() {
-                    break;
-                }
-            }
-        }
         let notes = warnings(&atlas, config);
         let folder = self.output.join(self.id);
         let folder = folder.join(Self::subfolder(index, components));
-        Ok(match added {
-            Ok(shown) => published(Ok(Summary::of(&atlas, folder)), notes, shown),
-            Err(error) => published(Err(error), notes, None),
-        })
+        Ok(published(Ok(Summary::of(&atlas, folder)), notes, shown))
     }
 
     /// Writes the atlas of a component, checks it and draws it; its images, which nothing else asks for, are gone then. The inner error says why it is
