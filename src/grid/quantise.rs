@@ -39,6 +39,8 @@ const NO_LENGTH: f64 = 1000.0;
 /// The number of cells is mended by the size where it misses what is wanted by more than this part.
 const NEAR: f64 = 0.05;
 const MOST_SIZES: usize = 6;
+/// Smaller sizes one after the other at which nothing changes, before no fewer cells are thought to fit.
+const MOST_UNCHANGED: usize = 2;
 
 /// Steps for about as many cells as are wanted: as near as can be, but no fewer than the cones need.
 pub fn quantise(complex: &Complex, vertices: usize, cells: f64) -> Result<Lattice, GridError> {
@@ -62,6 +64,7 @@ pub fn quantise(complex: &Complex, vertices: usize, cells: f64) -> Result<Lattic
     let mut best = lattice.clone();
     let miss = |lattice: &Lattice| (cells / lattice.cells() as f64).ln();
     let (mut low, mut high) = (None, None);
+    let mut unchanged = 0;
     for _ in 0..MOST_SIZES {
         let off = miss(&lattice);
         if off.abs() < NEAR {
@@ -73,15 +76,21 @@ pub fn quantise(complex: &Complex, vertices: usize, cells: f64) -> Result<Lattic
         }
         lattice.scale = match (low, high) {
             (Some(low), Some(high)) => f64::sqrt(low * high),
-            _ => lattice.scale * (0.5 * off).exp(),
+            // Farther where the last size was too near for a walk.
+            _ => lattice.scale * (0.5 * (1 + unchanged) as f64 * off).exp(),
         };
         let before = lattice.cells();
         lattice.settle(vertices, &angles, &mut walks);
         if miss(&lattice).abs() < miss(&best).abs() {
             best = lattice.clone();
         }
+        unchanged = if lattice.cells() == before {
+            unchanged + 1
+        } else {
+            0
+        };
         // No fewer fit between the cones.
-        if off < 0.0 && lattice.cells() == before {
+        if off < 0.0 && unchanged == MOST_UNCHANGED {
             break;
         }
     }
