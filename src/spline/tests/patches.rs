@@ -150,42 +150,6 @@ fn patches_of_a_ball_look_outward() {
     }
 }
 
-/// Where last squares would fold, there are knots closer to irregular points, and then they do not.
-#[test]
-fn knots_closer_to_irregular_points_unfold_last_squares() {
-    let (cage, round) = ball(2, |_| false);
-    let evaluator = Evaluator::new(&cage);
-    let mut graded = 0;
-    for seed in 1..=60 {
-        let mut noise = noise(seed);
-        let mut aside = |x: f64| x + 0.5 * (noise() - 0.5);
-        let points: Vec<[f64; 3]> = round.iter().map(|p| p.map(&mut aside)).collect();
-        let patches = patches(&Limit::new(&cage, &evaluator, &points)).expect("patches");
-        // A knot more at both ends for each halving after the first; so many that nothing helps are not meant.
-        let halvings = (patches.surfaces[0].size()[0] - 9) / 2;
-        if !(2..6).contains(&halvings) {
-            continue;
-        }
-        graded += 1;
-        let last = 0.5f64.powi(halvings as i32);
-        for surface in &patches.surfaces {
-            for corner in 0..4 {
-                let from = |i: usize, is_far: bool| {
-                    let x = last * (i as f64 + 0.5) / 16.0;
-                    if is_far { 4.0 - x } else { x }
-                };
-                let at = |i: usize, j: usize| [from(i, corner & 1 == 1), from(j, corner & 2 == 2)];
-                for (i, j) in (0..15).flat_map(|i| (0..15).map(move |j| (i, j))) {
-                    let [here, right, above] =
-                        [at(i, j), at(i + 1, j), at(i, j + 1)].map(|at| normal(surface, at));
-                    assert!(dot(here, right) > 0.0 && dot(here, above) > 0.0, "{seed}");
-                }
-            }
-        }
-    }
-    assert!(graded > 0);
-}
-
 /// There are no T-junctions: a corner is nowhere else a control point of a side.
 #[test]
 fn corners_of_patches_are_corners_of_all() {
