@@ -9,17 +9,19 @@
 //! ρ_h, and ω_h = φ_g − φ_f − ρ_h, up to quarter turns, is by how much the field turns. Then Θ̂_v = Θ_v − Σ ω over the edges crossed
 //! once counterclockwise around v, and κ̂ = κ − Σ ω along a loop.
 //!
-//! A boundary edge counts as a face beyond it whose frame points along the edge and whose field is that direction: so the field is drawn to the border, and around a
+//! A boundary edge counts as a face beyond it whose frame points along the edge and whose field is that direction, or where it goes on the whole: so the field is drawn to the border, and around a
 //! boundary vertex, from border to border, Θ̂ is a multiple of π/2 as well. On the double the field is mirrored, and turns twice as much across the mirror.
 
 mod connection;
 mod quarters;
+mod ragged;
 mod smoothest;
 #[cfg(test)]
 mod tests;
 mod ways;
 
 pub use quarters::{GridCones, Moved};
+pub use ragged::leans;
 pub use smoothest::cross_field;
 
 use crate::flow::holonomy::HolonomyError;
@@ -39,7 +41,7 @@ pub struct CrossField {
     /// φ, radians from halfedge `3f`.
     pub direction: FaceVec<f64>,
     /// ω: by how much the field turns from the face of a halfedge to that of its twin, on the boundary to the direction of the border, radians; the twin's is its
-    /// negative. Between −π/4 and π/4 but where cones were moved.
+    /// negative. Between −π/4 and π/4 but where cones were moved, and at ragged borders.
     pub matching: HalfedgeVec<f64>,
 }
 

@@ -111,4 +111,12 @@ impl<'a> LoopedSurface<'a> {
             .map(|e| self.length[c.edge(own.edge_halfedge(e))])
             .collect()
     }
+
+    /// Which edges of `connectivity` are sides of features.
+    pub fn is_feature(&self) -> EdgeVec<bool> {
+        let mut is_feature = EdgeVec::filled(false, self.connectivity.edge_count());
+        let sides = self.glued.iter().flatten();
+        sides.for_each(|&e| is_feature[e] = true);
+        is_feature
+    }
 }

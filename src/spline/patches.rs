@@ -3,17 +3,16 @@
 //! *Enters:* a [`Limit`] surface whose cells have at most one irregular point each. *Leaves:* [`Patches`]: one surface a block of cells, which sides they share, and which are on the border.
 //!
 //! Blocks are the rectangles between lines that go straight on from every irregular point, along creases and the border until they come to an irregular point, to the border or back: the base complex. Where a rectangle would close up or lie beside itself, a
-//! line more goes all around. Every half of a cell has a knot, in both parameters of all patches; where last squares at irregular points would fold, so have a quarter, an eighth, … of the first and the last cell.
+//! line more goes all around. Every half of a cell has a knot, in both parameters of all patches.
 //!
 //! *Guaranteed:* a side is all of an interface or on the border; knots along both sides of an interface are the same, and control points to the last bit; irregular points and ends of creases are corners of all their patches; the patches are the limit surface to rounding but
-//! in a last square of at most a quarter of a cell at every irregular point, where they are as `tensor` says. No patch has an interface with itself unless it is one cell. *Not guaranteed:* equal normals across interfaces in those squares; few patches.
+//! in a last square of half a cell by half a cell at every irregular point, where they are as `tensor` says. No patch has an interface with itself unless it is one cell. *Not guaranteed:* equal normals across interfaces in those squares; few patches.
 
 use super::cage::{Cage, CellSide};
 use super::error::SplineError;
 use super::limit::Limit;
 use super::surface::BSplineSurface;
 use super::tensor::{irregular_corners, join_corners, surface};
-use crate::geometry::mesh::{cross, dot};
 use crate::grid::blocks::{Block, Blocks, Piece, Rules, Squares, side_of};
 use crate::parallel;
 
@@ -48,13 +47,6 @@ pub struct Interface {
     pub reversed: bool,
 }
 
-/// Halvings towards irregular points, at most.
-const MOST_HALVINGS: i32 = 6;
-/// Places along both sides of a last square where normals are compared.
-const PLACES: usize = 9;
-/// Places on its sides are inside by this part of it.
-const INSIDE: f64 = 1e-6;
-
 /// Patches of a surface whose cells have at most one irregular point each.
 ///
 /// # Errors
@@ -63,10 +55,9 @@ pub fn patches(limit: &Limit<'_>) -> Result<Patches, SplineError> {
     let cage = limit.cage;
     let irregular = cage.irregular();
     let Blocks { blocks, sides } = blocks(cage, &irregular)?;
-    let halvings = halvings(limit, &irregular);
     let mut surfaces = parallel::map(&blocks, |_, block| {
         let corners = irregular_corners(cage, block, &irregular);
-        let breaks = block.cells.map(|cells| breaks(cells, halvings));
+        let breaks = block.cells.map(breaks);
         surface(limit, block, corners, breaks)
     });
     join_corners(cage, &blocks, &mut surfaces);
@@ -83,55 +74,9 @@ pub fn patches(limit: &Limit<'_>) -> Result<Patches, SplineError> {
     Ok(patches)
 }
 
-/// Parameters between which a surface is one piece: every half of a cell, and 2⁻ᵈ of one from both ends.
-fn breaks(cells: usize, halvings: i32) -> Vec<f64> {
-    let halves = (0..=2 * cells).map(|i| i as f64 / 2.0);
-    let graded = (2..=halvings).map(|d| 0.5f64.powi(d));
-    let ends = graded.flat_map(|x| [x, cells as f64 - x]);
-    let mut breaks: Vec<f64> = halves.chain(ends).collect();
-    breaks.sort_by(f64::total_cmp);
-    breaks
-}
-
-/// The fewest halvings towards irregular points with which no last square folds; where some always does, those with which the fewest do.
-fn halvings(limit: &Limit<'_>, irregular: &[bool]) -> i32 {
-    let cage = limit.cage;
-    let sides = (0..cage.cells.len() as u32).flat_map(|c| [0, 1, 2, 3].map(|k| (c, k)));
-    let corners: Vec<CellSide> = sides
-        .filter(|&side| irregular[cage.tail(side) as usize])
-        .collect();
-    let mut best = (usize::MAX, 1);
-    for halvings in 1..=MOST_HALVINGS {
-        let folds = parallel::map(&corners, |_, &corner| folds(limit, corner, halvings));
-        let count = folds.into_iter().filter(|folds| *folds).count();
-        best = best.min((count, halvings));
-        if count == 0 {
-            break;
-        }
-    }
-    best.1
-}
-
-/// Whether the last square at a corner of a cell folds, or turns by a right angle from one of its places to the next.
-fn folds(limit: &Limit<'_>, corner: CellSide, halvings: i32) -> bool {
-    let block = Block {
-        cells: [1, 1],
-        squares: vec![corner],
-    };
-    let breaks = [1, 1].map(|cells| breaks(cells, halvings));
-    let surface = surface(limit, &block, [true, false, false, false], breaks);
-    let last = 0.5f64.powi(halvings);
-    let normals: Vec<[f64; 3]> = (0..PLACES * PLACES)
-        .map(|i| [i % PLACES, i / PLACES].map(|x| x as f64 / (PLACES - 1) as f64))
-        .map(|at| surface.at(at.map(|x| last * x.clamp(INSIDE, 1.0 - INSIDE))))
-        .map(|jet| cross(jet.tangent[0], jet.tangent[1]))
-        .collect();
-    (0..normals.len()).any(|i| {
-        let right = (i % PLACES + 1 < PLACES).then(|| i + 1);
-        let above = (i + PLACES < normals.len()).then(|| i + PLACES);
-        let mut next = [right, above].into_iter().flatten();
-        next.any(|next| dot(normals[i], normals[next]) <= 0.0)
-    })
+/// Parameters between which a surface is one piece: every half of a cell.
+fn breaks(cells: usize) -> Vec<f64> {
+    (0..=2 * cells).map(|i| i as f64 / 2.0).collect()
 }
 
 /// Rectangles of cells whose sides meet whole sides.

@@ -9,7 +9,7 @@
 use super::error::ConeError;
 use super::request::RequestedCone;
 use crate::flow::features::{Feature, FeatureParams, features};
-use crate::flow::field::{FieldError, GridCones, cross_field};
+use crate::flow::field::{FieldError, GridCones, cross_field, leans};
 use crate::flow::looped::LoopedSurface;
 use crate::flow::metric::face_lengths;
 use crate::flow::opened::Opened;
@@ -29,6 +29,9 @@ const LEAST_QUARTERS: i64 = 3;
 /// Distance at which cones of opposite curvature cancel each other, in square roots of the component's area: about a cell of a grid of ten
 /// thousand quads. Half of the cones of a scan go, and the deviation of the log scale grows by up to a quarter, from 0.064 to 0.079.
 const NEAR: f64 = 0.01;
+
+/// Length on either side of a border's edge over which teeth are none of the border's directions, in the same unit: about a cell of a grid of two thousand quads.
+const RAGGED: f64 = 0.02;
 
 /// Most that curvature may weigh in a face, beside an edge: thin ones would say what they do not know.
 const MOST_PULL: f64 = 1.0;
@@ -94,10 +97,14 @@ fn along(
         }
     });
     let pull: FaceVec<[f64; 2]> = pull.collect();
-    let mut field = cross_field(own, &angle, &area, &pull)?;
+    let size = area.iter().sum::<f64>().sqrt();
+    let is_feature = surface.is_feature();
+    let is_border = |h| !is_feature[surface.connectivity.edge(h)];
+    let lean = leans(own, &angle, &length, is_border, RAGGED * size);
+    let mut field = cross_field(own, &angle, &area, &pull, &lean)?;
     let asked = GridCones {
         least: LEAST_QUARTERS,
-        near: NEAR * area.iter().sum::<f64>().sqrt(),
+        near: NEAR * size,
         most: count.unwrap_or(usize::MAX),
     };
     let (signature, moved) = field.grid_signature(&surface, &angle, &asked)?;

@@ -37,16 +37,20 @@ const CLEARLY: f64 = 0.8;
 const RATE_STEPS: usize = 3;
 
 /// The smoothest cross field of a surface, drawn to the border where it has one. `angle`: corner angles, radians; `area`: any unit. `pull`: what draws every face to a
-/// cross of angle θ from its first halfedge, weight times e^{4iθ}; beside it an edge has the weight 1.
+/// cross of angle θ from its first halfedge, weight times e^{4iθ}; beside it an edge has the weight 1. `lean`: by how much the direction that a boundary halfedge draws to differs from its own, radians.
 pub fn cross_field(
     connectivity: &Connectivity,
     angle: &FaceVec<[f64; 3]>,
     area: &FaceVec<f64>,
     pull: &FaceVec<[f64; 2]>,
+    lean: &HalfedgeVec<f64>,
 ) -> Result<CrossField, FieldError> {
     let _part = part!("cross field");
     let c = connectivity;
-    let rho = transport(c, angle);
+    let mut rho = transport(c, angle);
+    for h in c.halfedges().filter(|&h| c.twin(h).is_none()) {
+        rho[h] -= lean[h];
+    }
     let energy = Energy::new(c, &rho, area, pull);
     let root = match energy.wanted > 0.0 {
         true => energy.diffused()?,
@@ -62,8 +66,10 @@ pub fn cross_field(
         let beyond = c.twin(h).map_or(0.0, |t| direction[c.face(t)]);
         let turn = beyond - direction[c.face(h)] - rho[h];
         matching[h] = turn - (turn / FRAC_PI_2).round() * FRAC_PI_2;
-        if let Some(t) = c.twin(h) {
-            matching[t] = -matching[h];
+        match c.twin(h) {
+            Some(t) => matching[t] = -matching[h],
+            // To the direction of the border itself.
+            None => matching[h] -= lean[h],
         }
     }
     Ok(CrossField {

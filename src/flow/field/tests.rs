@@ -12,6 +12,7 @@ struct Fielded {
     angle: FaceVec<[f64; 3]>,
     area: FaceVec<f64>,
     pull: FaceVec<[f64; 2]>,
+    lean: HalfedgeVec<f64>,
     loops: DualLoops,
 }
 
@@ -43,6 +44,7 @@ fn prepare(shape: &Shape) -> Fielded {
             .map(|f| triangle::area(sides(f)).unwrap())
             .collect(),
         pull: FaceVec::filled([0.0; 2], c.face_count()),
+        lean: HalfedgeVec::filled(0.0, c.halfedge_count()),
         loops: homology_basis(c).unwrap(),
     }
 }
@@ -64,7 +66,7 @@ fn energy(field: &CrossField) -> f64 {
 fn signatures_are_integers_that_meet_gauss_bonnet() {
     for shape in closed() {
         let x = prepare(&shape);
-        let field = cross_field(&x.c, &x.angle, &x.area, &x.pull).unwrap();
+        let field = cross_field(&x.c, &x.angle, &x.area, &x.pull, &x.lean).unwrap();
         let signature = field.signature(&x.looped(), &x.angle).unwrap();
         let curvature: i64 = signature.cone.iter().map(|k| FULL_TURN - k).sum();
         let chi = x.c.topology().euler_characteristic;
@@ -92,7 +94,7 @@ fn the_field_of_a_flat_torus_is_parallel() {
         .map(|e| if is_diagonal(e) { 2.0_f64.sqrt() } else { 1.0 });
     shape.length = length.collect();
     let x = prepare(&shape);
-    let field = cross_field(&x.c, &x.angle, &x.area, &x.pull).unwrap();
+    let field = cross_field(&x.c, &x.angle, &x.area, &x.pull, &x.lean).unwrap();
     assert!(field.matching.iter().all(|w| w.abs() < 1e-6));
     let signature = field.signature(&x.looped(), &x.angle).unwrap();
     assert!(signature.cone.iter().all(|&k| k == FULL_TURN));
@@ -103,7 +105,7 @@ fn the_field_of_a_flat_torus_is_parallel() {
 #[test]
 fn no_face_can_turn_to_make_the_field_smoother() {
     let x = prepare(&shapes::plate(2, 3));
-    let field = cross_field(&x.c, &x.angle, &x.area, &x.pull).unwrap();
+    let field = cross_field(&x.c, &x.angle, &x.area, &x.pull, &x.lean).unwrap();
     let mut smoother = 0;
     for f in x.c.faces() {
         let around = x.c.face_halfedges(f);
@@ -130,7 +132,7 @@ fn no_face_can_turn_to_make_the_field_smoother() {
 #[test]
 fn a_broken_matching_is_refused() {
     let x = prepare(&shapes::torus(9, 7));
-    let field = cross_field(&x.c, &x.angle, &x.area, &x.pull).unwrap();
+    let field = cross_field(&x.c, &x.angle, &x.area, &x.pull, &x.lean).unwrap();
     let mut broken = field.clone();
     broken.matching[x.c.corner_halfedge(FaceId::new(3), 0)] += 0.1;
     let error = broken.signature(&x.looped(), &x.angle).unwrap_err();
@@ -156,7 +158,7 @@ fn spiky() -> Shape {
 #[test]
 fn sharp_cones_are_given_quarter_turns() {
     let x = prepare(&spiky());
-    let mut field = cross_field(&x.c, &x.angle, &x.area, &x.pull).unwrap();
+    let mut field = cross_field(&x.c, &x.angle, &x.area, &x.pull, &x.lean).unwrap();
     let before = field.signature(&x.looped(), &x.angle).unwrap();
     let lacking: i64 = before.cone.iter().map(|k| (3 - k).max(0)).sum();
     assert!(lacking > 0, "the spikes are no sharp cones");
@@ -168,7 +170,7 @@ fn sharp_cones_are_given_quarter_turns() {
     signature.check(&x.c, &x.loops).unwrap();
     // The changed field is a field still.
     assert_eq!(field.signature(&x.looped(), &x.angle).unwrap(), signature);
-    let mut again = cross_field(&x.c, &x.angle, &x.area, &x.pull).unwrap();
+    let mut again = cross_field(&x.c, &x.angle, &x.area, &x.pull, &x.lean).unwrap();
     assert_eq!(
         again
             .grid_signature(&x.looped(), &x.angle, &GridCones::at_least(3))
@@ -188,7 +190,7 @@ fn four_vertices_are_too_few_for_a_grid() {
     ];
     let faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]];
     let x = prepare(&Shape::new("tetrahedron", &faces, &positions));
-    let mut field = cross_field(&x.c, &x.angle, &x.area, &x.pull).unwrap();
+    let mut field = cross_field(&x.c, &x.angle, &x.area, &x.pull, &x.lean).unwrap();
     let error = field
         .grid_signature(&x.looped(), &x.angle, &GridCones::at_least(3))
         .unwrap_err();
@@ -228,7 +230,7 @@ fn near_cones_of_opposite_curvature_cancel() {
     let mut merged = 0;
     for shape in [spiky(), shapes::plate(2, 3), shapes::plate(3, 2)] {
         let x = prepare(&shape);
-        let start = cross_field(&x.c, &x.angle, &x.area, &x.pull).unwrap();
+        let start = cross_field(&x.c, &x.angle, &x.area, &x.pull, &x.lean).unwrap();
         for near in [0.1, 0.3, 0.6].map(|part| part * x.area.iter().sum::<f64>().sqrt()) {
             let mut field = start.clone();
             let asked = GridCones {
@@ -259,7 +261,7 @@ fn cones_are_as_few_as_asked() {
         (shapes::plate(3, 2), 1),
     ] {
         let x = prepare(&shape);
-        let start = cross_field(&x.c, &x.angle, &x.area, &x.pull).unwrap();
+        let start = cross_field(&x.c, &x.angle, &x.area, &x.pull, &x.lean).unwrap();
         let inside = |s: &Signature| s.cone.iter().filter(|&&k| k != FULL_TURN).count();
         let free = inside(&start.signature(&x.looped(), &x.angle).unwrap());
         for most in [free, (free + fewest) / 2, fewest] {
@@ -298,11 +300,11 @@ fn a_field_is_drawn_to_what_pulls() {
         let cross = |f| [(4.0 * wanted(f)).cos(), (4.0 * wanted(f)).sin()].map(|p| weight * p);
         x.c.faces().map(cross).collect()
     };
-    let drawn = cross_field(&x.c, &x.angle, &x.area, &pull(1e6)).unwrap();
+    let drawn = cross_field(&x.c, &x.angle, &x.area, &pull(1e6), &x.lean).unwrap();
     for f in x.c.faces() {
         let off = (drawn.direction[f] - wanted(f)) / FRAC_PI_2;
         assert!((off - off.round()).abs() < 1e-4, "{f}: {off}");
     }
-    let smooth = cross_field(&x.c, &x.angle, &x.area, &x.pull).unwrap();
+    let smooth = cross_field(&x.c, &x.angle, &x.area, &x.pull, &x.lean).unwrap();
     assert!(energy(&smooth) < 0.5 * energy(&drawn));
 }

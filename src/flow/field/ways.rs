@@ -53,12 +53,7 @@ impl<'a> Angles<'a> {
             total[of] += cone[v];
             sectors[of] += 1;
         }
-        let mut is_feature = EdgeVec::filled(false, surface.connectivity.edge_count());
-        surface
-            .glued
-            .iter()
-            .flatten()
-            .for_each(|&e| is_feature[e] = true);
+        let is_feature = surface.is_feature();
         let mut is_border = VertexVec::filled(false, vertex.len());
         for h in c.halfedges().filter(|&h| c.twin(h).is_none()) {
             if !is_feature[surface.connectivity.edge(h)] {

@@ -11,7 +11,7 @@ use crate::flow::metric::face_lengths;
 use crate::flow::ricci::shapes::{self, Shape};
 use crate::flow::signature::{FULL_TURN, Infeasible};
 use crate::flow::solve::SymmetricSolver;
-use crate::geometry::ids::{EdgeId, FaceId, FaceVec, HalfedgeId, VertexId, VertexVec};
+use crate::geometry::ids::{EdgeId, FaceId, FaceVec, HalfedgeId, HalfedgeVec, VertexId, VertexVec};
 use crate::geometry::triangle;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -39,7 +39,8 @@ fn field_of(on: &LoopedSurface) -> (CrossField, FaceVec<[f64; 3]>) {
         .collect();
     let area = own.faces().map(|f| triangle::area(sides(f)).unwrap());
     let pull = FaceVec::filled([0.0; 2], own.face_count());
-    let field = cross_field(own, &angle, &area.collect(), &pull).unwrap();
+    let lean = HalfedgeVec::filled(0.0, own.halfedge_count());
+    let field = cross_field(own, &angle, &area.collect(), &pull, &lean).unwrap();
     (field, angle)
 }
 
