@@ -101,7 +101,9 @@ pub fn features(mesh: &Mesh, params: &FeatureParams, named: &[EdgeId]) -> Vec<Fe
             || length >= LONG && meets_at_quarter_turns(mesh, &sharp, f)
             || f.edges.iter().any(|&e| is_named[e])
     };
-    let mut found: Vec<Feature> = chains(mesh, &sharp)
+    let is_ridge = |e: EdgeId| (bend[e] >= least).then(|| is_ridge(mesh, e));
+    let is_ridge: EdgeVec<Option<bool>> = c.edges().map(is_ridge).collect();
+    let mut found: Vec<Feature> = chains(mesh, &sharp, &is_ridge)
         .into_iter()
         .map(|chain| feature(mesh, &bend, chain))
         .filter(counts)
@@ -210,12 +212,31 @@ fn is_between_materials(mesh: &Mesh, e: EdgeId) -> bool {
     c.twin(h).is_some_and(|t| of(h) != of(t))
 }
 
-/// Maximal chains of sharp edges between vertices where other than two of them meet, or which lie on the boundary; then closed ones.
-fn chains(mesh: &Mesh, sharp: &EdgeVec<bool>) -> Vec<Vec<VertexId>> {
+/// Whether faces at an edge look away from each other, as at a ridge, and not towards each other, as in a valley.
+fn is_ridge(mesh: &Mesh, e: EdgeId) -> bool {
+    let c = &mesh.connectivity;
+    let h = c.edge_halfedge(e);
+    let [p, q, r] = mesh.face_positions(c.face(h));
+    let beyond = c.twin(h).map_or(p, |t| mesh.positions[c.apex(t)]);
+    dot(cross(sub(q, p), sub(r, p)), sub(beyond, p)) < 0.0
+}
+
+/// Maximal chains of sharp edges between vertices where other than two of them meet, or a ridge and a valley, as they do again and again on noise, or which lie on the boundary; then closed ones.
+fn chains(
+    mesh: &Mesh,
+    sharp: &EdgeVec<bool>,
+    is_ridge: &EdgeVec<Option<bool>>,
+) -> Vec<Vec<VertexId>> {
     let c = &mesh.connectivity;
     let mut degree = VertexVec::filled(0, c.vertex_count());
+    let mut kinds = VertexVec::filled([false; 2], c.vertex_count());
     for (e, _) in sharp.enumerate().filter(|(_, s)| **s) {
-        c.edge_vertices(e).into_iter().for_each(|v| degree[v] += 1);
+        for v in c.edge_vertices(e) {
+            degree[v] += 1;
+            if let Some(ridge) = is_ridge[e] {
+                kinds[v][usize::from(ridge)] = true;
+            }
+        }
     }
     let mut is_walked = EdgeVec::filled(false, c.edge_count());
     let neighbours = |v: VertexId| {
@@ -226,7 +247,7 @@ fn chains(mesh: &Mesh, sharp: &EdgeVec<bool>) -> Vec<Vec<VertexId>> {
         let [a, b] = c.edge_vertices(e);
         if a == v { b } else { a }
     };
-    let is_end = |v: VertexId| degree[v] != 2 || c.is_boundary_vertex(v);
+    let is_end = |v: VertexId| degree[v] != 2 || kinds[v] == [true; 2] || c.is_boundary_vertex(v);
     let mut chains = Vec::new();
     let mut walk = |start: VertexId, is_walked: &mut EdgeVec<bool>| {
         while let Some(first) = neighbours(start).find(|&e| !is_walked[e]) {
@@ -333,6 +354,44 @@ mod tests {
         let corners = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let faces = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
         assert_eq!(sharp(&surface(corners, faces)), 0);
+    }
+
+    /// Sharp edges of noise go up and down.
+    #[test]
+    fn chains_end_between_ridges_and_valleys() {
+        let mesh = marked(2);
+        let c = &mesh.connectivity;
+        let is_inside = |e: EdgeId| {
+            let at = c.edge_vertices(e).map(|v| mesh.positions[v]);
+            at.iter().all(|p| p[1] == 0.6)
+        };
+        let sharp: EdgeVec<bool> = c.edges().map(is_inside).collect();
+        let chains = |is_ridge: &dyn Fn(EdgeId) -> Option<bool>| {
+            let is_ridge: EdgeVec<Option<bool>> = c.edges().map(is_ridge).collect();
+            chains(&mesh, &sharp, &is_ridge).len()
+        };
+        let x = |e: EdgeId| {
+            let at = c.edge_vertices(e).map(|v| mesh.positions[v][0]);
+            0.5 * (at[0] + at[1])
+        };
+        assert_eq!(chains(&|_| None), 1);
+        assert_eq!(chains(&|_| Some(true)), 1);
+        assert_eq!(chains(&|e| Some(x(e) < 0.6)), 2);
+        // What has no bend is no end.
+        assert_eq!(chains(&|e| (x(e) > 0.6).then_some(true)), 1);
+    }
+
+    #[test]
+    fn ridges_look_away_from_each_other() {
+        let cube = polycube([[0, 0, 0]], |_, _, _| true);
+        let c = &cube.connectivity;
+        let sharp = |e: &EdgeId| bend(&cube, *e) > 1.0;
+        assert!(c.edges().filter(sharp).all(|e| is_ridge(&cube, e)));
+        let faces = c.to_faces().into_iter().map(|[a, b, c]| [a, c, b]);
+        let inside_out = surface(cube.positions.as_slice().to_vec(), faces.collect());
+        let c = &inside_out.connectivity;
+        let sharp = |e: &EdgeId| bend(&inside_out, *e) > 1.0;
+        assert!(c.edges().filter(sharp).all(|e| !is_ridge(&inside_out, e)));
     }
 
     #[test]

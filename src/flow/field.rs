@@ -13,6 +13,7 @@
 //! boundary vertex, from border to border, Θ̂ is a multiple of π/2 as well. On the double the field is mirrored, and turns twice as much across the mirror.
 
 mod connection;
+mod diffused;
 mod quarters;
 mod ragged;
 mod smoothest;
@@ -20,6 +21,7 @@ mod smoothest;
 mod tests;
 mod ways;
 
+pub use diffused::diffused;
 pub use quarters::{GridCones, Moved};
 pub use ragged::leans;
 pub use smoothest::cross_field;

@@ -9,7 +9,7 @@
 use super::error::ConeError;
 use super::request::RequestedCone;
 use crate::flow::features::{Feature, FeatureParams, features};
-use crate::flow::field::{FieldError, GridCones, cross_field, leans};
+use crate::flow::field::{FieldError, GridCones, cross_field, diffused, leans};
 use crate::flow::looped::LoopedSurface;
 use crate::flow::metric::face_lengths;
 use crate::flow::opened::Opened;
@@ -26,7 +26,7 @@ use std::sync::Arc;
 /// Least angle of a cone, quarter turns: around a vertex of two quads these would share two edges.
 const LEAST_QUARTERS: i64 = 3;
 
-/// Distance at which cones of opposite curvature cancel each other, in square roots of the component's area: about a cell of a grid of ten
+/// Distance at which cones of opposite curvature cancel each other, and over which the surface's curvature counts as spread, in square roots of the component's area: about a cell of a grid of ten
 /// thousand quads. Half of the cones of a scan go, and the deviation of the log scale grows by up to a quarter, from 0.064 to 0.079.
 const NEAR: f64 = 0.01;
 
@@ -100,7 +100,9 @@ fn along(
     let size = area.iter().sum::<f64>().sqrt();
     let is_feature = surface.is_feature();
     let is_border = |h| !is_feature[surface.connectivity.edge(h)];
-    let lean = leans(own, &angle, &length, is_border, RAGGED * size);
+    let mut lean = leans(own, &angle, &length, is_border, RAGGED * size);
+    let even = diffused(own, &angle, &area, NEAR * size).map_err(FieldError::from)?;
+    own.halfedges().for_each(|h| lean[h] += even[h]);
     let mut field = cross_field(own, &angle, &area, &pull, &lean)?;
     let asked = GridCones {
         least: LEAST_QUARTERS,

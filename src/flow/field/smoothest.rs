@@ -37,7 +37,7 @@ const CLEARLY: f64 = 0.8;
 const RATE_STEPS: usize = 3;
 
 /// The smoothest cross field of a surface, drawn to the border where it has one. `angle`: corner angles, radians; `area`: any unit. `pull`: what draws every face to a
-/// cross of angle θ from its first halfedge, weight times e^{4iθ}; beside it an edge has the weight 1. `lean`: by how much the direction that a boundary halfedge draws to differs from its own, radians.
+/// cross of angle θ from its first halfedge, weight times e^{4iθ}; beside it an edge has the weight 1. `lean`: by how much less a direction shall turn across a halfedge than the angles say (its twin's is the negative), and by how much the direction that a boundary halfedge draws to differs from its own, radians.
 pub fn cross_field(
     connectivity: &Connectivity,
     angle: &FaceVec<[f64; 3]>,
@@ -48,7 +48,7 @@ pub fn cross_field(
     let _part = part!("cross field");
     let c = connectivity;
     let mut rho = transport(c, angle);
-    for h in c.halfedges().filter(|&h| c.twin(h).is_none()) {
+    for h in c.halfedges() {
         rho[h] -= lean[h];
     }
     let energy = Energy::new(c, &rho, area, pull);
@@ -65,11 +65,10 @@ pub fn cross_field(
         let h = c.edge_halfedge(e);
         let beyond = c.twin(h).map_or(0.0, |t| direction[c.face(t)]);
         let turn = beyond - direction[c.face(h)] - rho[h];
-        matching[h] = turn - (turn / FRAC_PI_2).round() * FRAC_PI_2;
-        match c.twin(h) {
-            Some(t) => matching[t] = -matching[h],
-            // To the direction of the border itself.
-            None => matching[h] -= lean[h],
+        // The turn that is meant, and what the surface's own angles turn beside it.
+        matching[h] = turn - (turn / FRAC_PI_2).round() * FRAC_PI_2 - lean[h];
+        if let Some(t) = c.twin(h) {
+            matching[t] = -matching[h];
         }
     }
     Ok(CrossField {
