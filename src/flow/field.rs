@@ -43,7 +43,7 @@ pub struct CrossField {
     /// φ, radians from halfedge `3f`.
     pub direction: FaceVec<f64>,
     /// ω: by how much the field turns from the face of a halfedge to that of its twin, on the boundary to the direction of the border, radians; the twin's is its
-    /// negative. Between −π/4 and π/4 but where cones were moved, and at ragged borders.
+    /// negative. Between −π/4 and π/4, beside what directions were made to turn less (`lean` of [`cross_field`]), but where cones were moved.
     pub matching: HalfedgeVec<f64>,
 }
 
