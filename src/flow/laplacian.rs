@@ -46,8 +46,8 @@ pub(crate) struct Hessian {
 }
 
 impl System {
-    /// The unknowns of the triangulation as it is now. Vertices that share their `u` are one unknown. The order of `last` is kept
-    /// where hardly an edge was flipped since.
+    /// The unknowns of the triangulation as it is now. Vertices that share their `u` are one unknown. `last`, of the same unknowns, leaves its memory, and its
+    /// order where hardly an edge was flipped since.
     pub(crate) fn new(of: &Unknowns, last: Option<Self>) -> Result<Self, SolveError> {
         let connectivity = of.connectivity;
         let mut own: Vec<VertexId> = connectivity
@@ -76,8 +76,9 @@ impl System {
         let fresh = |last: &Self| {
             (flips - last.ordered) as f64 <= STALE_SHARE * connectivity.edge_count() as f64
         };
-        let (solver, ordered) = match last.filter(fresh) {
-            Some(last) => (last.solver.with_pairs(&pairs)?, last.ordered),
+        let (solver, ordered) = match last {
+            Some(last) if fresh(&last) => (last.solver.with_pairs(&pairs)?, last.ordered),
+            Some(last) => (last.solver.renewed(0, &pairs)?, flips),
             None => (SymmetricSolver::new(own.len(), &pairs)?, flips),
         };
         Ok(Self {

@@ -36,6 +36,21 @@ impl Observed<'_> {
         self.observer.stage(stage, self.component, self.components);
         Ok(())
     }
+
+    fn build(
+        &self,
+        component: Component,
+        requests: &Requests,
+        config: &Config,
+        spacing: Spacing,
+        no_grid: Option<String>,
+    ) -> Result<AffineAtlas, BuildError> {
+        let enter = |stage| self.enter(stage);
+        let observer = self.observer;
+        pipeline(
+            component, requests, config, spacing, no_grid, observer, &enter,
+        )
+    }
 }
 
 /// A component, with what it is asked for.
@@ -60,16 +75,16 @@ struct Way {
     for_refused: bool,
 }
 
-impl Part<'_> {
+impl<'a> Part<'a> {
     /// Its atlas, of flat patches where a grid cannot be made.
-    pub fn atlas(&self) -> Result<AffineAtlas, BuildError> {
+    pub fn atlas(self) -> Result<AffineAtlas, BuildError> {
         self.accepted(|atlas| Ok(Ok(atlas)))?
     }
 
     /// What `accept` makes of the first atlas that it takes: on its grid; on others, where faces are too thin for that one or it is not taken; at last of flat patches. The inner error is that of
     /// the component, and the first of them; the outer one ends the job.
     pub fn accepted<T>(
-        &self,
+        self,
         mut accept: impl FnMut(AffineAtlas) -> Result<Result<T, BuildError>, BuildError>,
     ) -> Result<Result<T, BuildError>, BuildError> {
         let mut first = None;
@@ -78,7 +93,9 @@ impl Part<'_> {
             if way.for_refused && !is_refused {
                 continue;
             }
-            let error = match self.built(&self.requests, &way.config, way.spacing, None) {
+            let component = self.component.clone();
+            let (observed, requests) = (self.observed(), &self.requests);
+            let error = match observed.build(component, requests, &way.config, way.spacing, None) {
                 Ok(atlas) => {
                     let has_grid = atlas.grid.is_some();
                     match accept(atlas)? {
@@ -104,19 +121,16 @@ impl Part<'_> {
             first.get_or_insert(error);
         }
         match first {
-            Some(reason) if self.component.mesh.is_ok() && self.config.domain() == Domain::Grid => {
-                match self.without_grid(reason.to_string()) {
-                    Ok(atlas) => accept(atlas),
-                    Err(BuildError::Cancelled) => Err(BuildError::Cancelled),
-                    Err(error) => Ok(Err(error)),
-                }
-            }
-            Some(error) => Ok(Err(error)),
-            None => Ok(Err(BuildError::Cancelled)),
+            Some(error) if self.component.mesh.is_err() => Ok(Err(error)),
+            reason => match self.of_flat_patches(reason.map(|error| error.to_string())) {
+                Ok(atlas) => accept(atlas),
+                Err(BuildError::Cancelled) => Err(BuildError::Cancelled),
+                Err(error) => Ok(Err(error)),
+            },
         }
     }
 
-    /// Grids one after the other: with fewer vertices, with more, whose triangles are less thin, and with its own; then, where one was refused, with more cells, whose lines leave no slivers where those
+    /// Grids one after the other, where one was asked for: with fewer vertices, with more, whose triangles are less thin, and with its own; then, where one was refused, with more cells, whose lines leave no slivers where those
     /// of fewer did, and without sharp edges as lines.
     fn ways(&self) -> impl Iterator<Item = Way> {
         let first = self.spacings()[0];
@@ -130,18 +144,16 @@ impl Part<'_> {
                 for_refused,
             }
         };
-        let is_grid = self.config.domain() == Domain::Grid;
-        let others = move || match is_grid {
-            true => self.other_spacings(),
-            false => Vec::new(),
-        };
         // Found out only where they are needed.
-        let spacings = std::iter::once(first).chain(std::iter::once_with(others).flatten());
+        let others = std::iter::once_with(|| self.other_spacings()).flatten();
+        let spacings = std::iter::once(first).chain(others);
         let spaced = spacings.map(|spacing| (spacing, self.config.clone()));
         let last = [more, smooth].map(|config| (first, config));
-        spaced
+        let ways = spaced
             .map(way(false))
-            .chain(last.into_iter().map(way(true)))
+            .chain(last.into_iter().map(way(true)));
+        let is_grid = self.config.domain() == Domain::Grid;
+        ways.take_while(move |_| is_grid)
     }
 
     /// Those of new vertices, at first and where that fails.
@@ -168,30 +180,22 @@ impl Part<'_> {
         spacings.split_off(1)
     }
 
-    /// Builds it of flat patches, for this reason.
-    fn without_grid(&self, reason: String) -> Result<AffineAtlas, BuildError> {
-        let (requests, config) = &self.flat;
-        self.built(requests, config, self.spacings()[0], Some(reason))
+    /// Builds it of flat patches, from all that is left of it; `reason` is why it has no grid, where one was asked for.
+    fn of_flat_patches(self, reason: Option<String>) -> Result<AffineAtlas, BuildError> {
+        let (observed, spacing) = (self.observed(), self.spacings()[0]);
+        let (requests, config) = match self.config.domain() {
+            Domain::Grid => self.flat,
+            Domain::Flat => (self.requests, self.config),
+        };
+        observed.build(self.component, &requests, &config, spacing, reason)
     }
 
-    fn built(
-        &self,
-        requests: &Requests,
-        config: &Config,
-        spacing: Spacing,
-        no_grid: Option<String>,
-    ) -> Result<AffineAtlas, BuildError> {
-        let component = self.component.clone();
-        let observed = Observed {
+    fn observed(&self) -> Observed<'a> {
+        Observed {
             observer: self.observer,
             component: self.index,
             components: self.components,
-        };
-        let enter = |stage| observed.enter(stage);
-        let observer = self.observer;
-        pipeline(
-            component, requests, config, spacing, no_grid, observer, &enter,
-        )
+        }
     }
 
     fn is_small(&self) -> bool {
@@ -205,7 +209,7 @@ pub(super) fn each<T: Send>(
     soup: &Soup,
     config: &Config,
     observer: &dyn Observer,
-    work: impl Fn(&Part<'_>) -> T + Sync,
+    work: impl Fn(Part<'_>) -> T + Sync,
     mut take: impl FnMut(T) -> Result<(), BuildError>,
 ) -> Result<(), BuildError> {
     observer.stage("repair", 0, 1);
@@ -236,8 +240,9 @@ pub(super) fn each<T: Send>(
     });
     let parts: Vec<Part<'_>> = parts.collect::<Result<_, BuildError>>()?;
     let worked = |part: Part<'_>| {
-        let made = work(&part);
-        observer.finished(part.index, components);
+        let index = part.index;
+        let made = work(part);
+        observer.finished(index, components);
         made
     };
     let mut small = Vec::new();

@@ -92,8 +92,8 @@ impl<'a> Publication<'a> {
     ///
     /// # Errors
     /// What concerns the whole asset: it was cancelled, or cannot be written.
-    pub fn component(&self, part: &Part<'_>) -> Result<Published, BuildError> {
-        let (index, components, config) = (part.index, part.components, &part.config);
+    pub fn component(&self, part: Part<'_>) -> Result<Published, BuildError> {
+        let (index, components, config) = (part.index, part.components, &part.config.clone());
         let published = |result, notes, shown| Published {
             index,
             components,

@@ -101,6 +101,7 @@ pub struct SymmetricSolver {
     division: Division,
     numeric: Numeric,
     factor: Vec<f64>,
+    /// Of factorisations by the crate, and of several right sides at a time.
     workspace: MemBuffer,
 }
 
@@ -140,21 +141,32 @@ impl SymmetricSolver {
         Self::ordered(size, pairs, Order::Blocks { width })
     }
 
-    /// The same for a pattern that differs little from this one: the order is kept, which saves most of the
+    /// The same for a pattern that differs little from this one, in the memory of this one: the order is kept, which saves most of the
     /// analysis. Where much has changed the factor fills up many times over: then order anew.
-    pub fn with_pairs(&self, pairs: &[[u32; 2]]) -> Result<Self, SolveError> {
-        let order = self.symbolic.perm().map(Order::Given);
-        Self::ordered(
-            self.size,
-            pairs,
-            order.unwrap_or(Order::LeastDegree { border: 0 }),
-        )
+    pub fn with_pairs(self, pairs: &[[u32; 2]]) -> Result<Self, SolveError> {
+        let given = self.symbolic.perm().map(|order| {
+            let (order, place) = order.arrays();
+            (order.to_vec(), place.to_vec())
+        });
+        let size = self.size;
+        let order = match &given {
+            Some((order, place)) => Order::Given(PermRef::new_checked(order, place, size)),
+            None => Order::LeastDegree { border: 0 },
+        };
+        let (factor, division) = self.leave();
+        Self::with_memory(size, pairs, order, factor, division)
     }
 
     /// [`with_border`](Self::with_border) for another pattern of as many unknowns, in the memory of this one. Of a large pattern the parts are kept that are ordered by themselves, as far as no entry leads from one to another.
     pub fn renewed(self, border: usize, pairs: &[[u32; 2]]) -> Result<Self, SolveError> {
-        let order = Order::LeastDegree { border };
-        Self::with_memory(self.size, pairs, order, self.factor, self.division)
+        let (size, order) = (self.size, Order::LeastDegree { border });
+        let (factor, division) = self.leave();
+        Self::with_memory(size, pairs, order, factor, division)
+    }
+
+    /// What another solver can use; all else is gone before that is made.
+    fn leave(self) -> (Vec<f64>, Division) {
+        (self.factor, self.division)
     }
 
     fn ordered(size: usize, pairs: &[[u32; 2]], order: Order<'_>) -> Result<Self, SolveError> {
@@ -227,22 +239,28 @@ impl SymmetricSolver {
         };
         let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, ordering, params)
             .map_err(|_| too_large)?;
-        let mut scratch = symbolic.solve_in_place_scratch::<f64>(BLOCK, Par::Seq);
-        let numeric = match is_large {
-            true => Numeric::Fronts(Fronts::new(&symbolic, size, pairs), pairs.len()),
+        let (numeric, scratch) = match is_large {
+            true => {
+                drop((column, row, slot));
+                let fronts = Fronts::new(&symbolic, size, pairs);
+                (Numeric::Fronts(fronts, pairs.len()), StackReq::EMPTY)
+            }
             false => {
-                let own = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
-                scratch = StackReq::or(scratch, own);
-                Numeric::Whole(Columns {
+                let columns = Columns {
                     first: column,
                     value: vec![0.0; row.len()],
                     row,
                     slot,
-                })
+                };
+                let scratch =
+                    symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
+                (Numeric::Whole(columns), scratch)
             }
         };
         let workspace = MemBuffer::try_new(scratch).map_err(|_| too_large)?;
-        factor.resize(symbolic.len_val(), 0.0);
+        let length = symbolic.len_val();
+        factor.reserve_exact(length.saturating_sub(factor.len()));
+        factor.resize(length, 0.0);
         Ok(Self {
             size,
             numeric,
@@ -331,6 +349,12 @@ impl SymmetricSolver {
             if columns == 1 {
                 self.solve_alone(block);
                 continue;
+            }
+            let scratch = self
+                .symbolic
+                .solve_in_place_scratch::<f64>(columns, Par::Seq);
+            if self.workspace.len() < scratch.unaligned_bytes_required() {
+                self.workspace = MemBuffer::new(scratch);
             }
             LltRef::new(&self.symbolic, &self.factor).solve_in_place_with_conj(
                 Conj::No,
@@ -482,136 +506,4 @@ fn least_degree(first: &[u32], row: &[u32]) -> Option<Vec<u32>> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Numbers without pattern, reproducible.
-    fn sequence(mut state: u64) -> impl FnMut() -> f64 {
-        move || {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        }
-    }
-
-    /// Gaussian elimination with pivoting.
-    fn dense_solve(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Vec<f64> {
-        let n = b.len();
-        for c in 0..n {
-            let pivot = (c..n)
-                .max_by(|&i, &j| a[i][c].abs().total_cmp(&a[j][c].abs()))
-                .unwrap();
-            a.swap(c, pivot);
-            b.swap(c, pivot);
-            for r in c + 1..n {
-                let t = a[r][c] / a[c][c];
-                let upper = a[c].clone();
-                for (x, y) in a[r].iter_mut().zip(upper).skip(c) {
-                    *x -= t * y;
-                }
-                b[r] -= t * b[c];
-            }
-        }
-        for c in (0..n).rev() {
-            let known: f64 = (c + 1..n).map(|j| a[c][j] * b[j]).sum();
-            b[c] = (b[c] - known) / a[c][c];
-        }
-        b
-    }
-
-    #[test]
-    fn agrees_with_dense_elimination_and_is_reusable() {
-        let mut random = sequence(7);
-        for n in [1usize, 2, 5, 40] {
-            let mut pairs = Vec::new();
-            for _ in 0..3 * n {
-                let i = (random() * n as f64) as u32;
-                let j = (random() * n as f64) as u32;
-                if i != j {
-                    pairs.push([i, j]);
-                }
-            }
-            // The same pair in both orders must add up.
-            if n > 1 {
-                pairs.extend([[0, 1], [1, 0]]);
-            }
-            let mut solver = SymmetricSolver::new(n, &pairs).unwrap();
-            for _ in 0..2 {
-                let off: Vec<f64> = pairs.iter().map(|_| -random()).collect();
-                let mut dense = vec![vec![0.0; n]; n];
-                for (p, w) in pairs.iter().zip(&off) {
-                    let [i, j] = p.map(|i| i as usize);
-                    dense[i][j] += w;
-                    dense[j][i] += w;
-                    dense[i][i] -= w;
-                    dense[j][j] -= w;
-                }
-                let mut diagonal = vec![0.0; n];
-                for i in 0..n {
-                    dense[i][i] += 0.1;
-                    diagonal[i] = dense[i][i];
-                }
-                let rhs: Vec<f64> = (0..n).map(|_| random() - 0.5).collect();
-                let expected = dense_solve(dense.clone(), rhs.clone());
-                // With its own order, and with that of itself, which must come to the same.
-                let mut kept = solver.with_pairs(&pairs).unwrap();
-                let mut last = SymmetricSolver::with_border(n, n.div_ceil(3), &pairs).unwrap();
-                for solver in [&mut solver, &mut kept, &mut last] {
-                    solver.factorize(&diagonal, &off).unwrap();
-                    let mut x = rhs.clone();
-                    solver.solve(&mut x);
-                    for (a, b) in x.iter().zip(&expected) {
-                        assert!((a - b).abs() < 1e-11, "{a} against {b}");
-                    }
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn blocks_are_ordered_as_a_whole() {
-        let mut random = sequence(11);
-        let (blocks, width) = (30, 2);
-        let mut pairs = Vec::new();
-        for b in 0..blocks as u32 {
-            pairs.push([2 * b, 2 * b + 1]);
-            let other = (random() * blocks as f64) as u32;
-            if other != b {
-                let (x, y) = (2 * b, 2 * other);
-                pairs.extend([[x, y], [x, y + 1], [x + 1, y], [x + 1, y + 1]]);
-            }
-        }
-        let size = width * blocks;
-        let off: Vec<f64> = pairs.iter().map(|_| random() - 0.5).collect();
-        let (diagonal, rhs) = (vec![40.0; size], (0..size).map(|_| random()));
-        let rhs: Vec<f64> = rhs.collect();
-        let solutions = [
-            SymmetricSolver::new(size, &pairs),
-            SymmetricSolver::with_blocks(size, width, &pairs),
-        ];
-        let [one, other] = solutions.map(|solver| {
-            let (mut solver, mut x) = (solver.unwrap(), rhs.clone());
-            solver.factorize(&diagonal, &off).unwrap();
-            solver.solve(&mut x);
-            x
-        });
-        for (a, b) in one.iter().zip(&other) {
-            assert!((a - b).abs() < 1e-14);
-        }
-    }
-
-    #[test]
-    fn singular_and_infinite_matrices_are_refused() {
-        let mut solver = SymmetricSolver::new(2, &[[0, 1]]).unwrap();
-        let refused = Err(SolveError::NotPositiveDefinite { unknowns: 2 });
-        assert_eq!(solver.factorize(&[1.0, -1.0], &[0.0]), refused);
-        assert_eq!(solver.factorize(&[1.0, 1.0], &[2.0]), refused);
-        assert_eq!(solver.factorize(&[f64::INFINITY, 1.0], &[0.0]), refused);
-        assert_eq!(solver.factorize(&[f64::NAN, 1.0], &[0.0]), refused);
-        assert_eq!(solver.factorize(&[2.0, 2.0], &[1.0]), Ok(()));
-        let mut empty = SymmetricSolver::new(0, &[]).unwrap();
-        empty.factorize(&[], &[]).unwrap();
-        empty.solve(&mut []);
-    }
-}
+mod tests;

@@ -48,7 +48,10 @@ const SHIFTS: [f64; 7] = [0.0, 1e-14, 1e-11, 1e-8, 1e-5, 1e-3, 1e-1];
 pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
     let params = problem.params;
     let mut u = problem.metric.start();
-    let (mut now, mut trial) = (Evaluation::default(), Evaluation::default());
+    // At the `u` that was looked at last: one for all, since it is a large part of what a flow holds.
+    let mut now = Evaluation::default();
+    // Of the quadrature, without flips.
+    let mut scratch = Evaluation::default();
     problem.metric.evaluate(&u, &mut now);
     let mut system = System::new(&problem.unknowns(), None)?;
     let mut weight = problem.metric.edge_weights(&now);
@@ -99,36 +102,36 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
             direction
                 .filter(|direction| {
                     let next = moved(&u, direction, 1.0);
-                    problem.metric.evaluate(&next, &mut trial);
-                    problem.max_error(&trial) < falls * record.max_error
+                    problem.metric.evaluate(&next, &mut now);
+                    problem.max_error(&now) < falls * record.max_error
                 })
                 .map(|direction| (direction, 1.0))
         } else {
             SHIFTS.iter().find_map(|&shift| {
                 let direction = system.direction(&hessian, shift, &residual)?;
-                let step = line_search(problem, &u, &direction, &residual, least, &mut trial)?;
+                let step = line_search(problem, &u, &direction, &residual, least, &mut now)?;
                 Some((direction, step))
             })
         };
         let Some((direction, step)) = taken else {
+            // The last trial may have flipped edges: `u` is measured anew on them.
+            problem.metric.evaluate(&u, &mut now);
             if !converged && problem.separate() {
-                problem.metric.evaluate(&u, &mut now);
                 weight = problem.metric.edge_weights(&now);
                 residual = problem.residual(&now);
                 record.max_error = problem.max_error(&now);
+                drop(system);
                 system = System::new(&problem.unknowns(), None)?;
                 polished = 0;
                 continue;
             }
             if near {
-                // The last trial may have flipped edges: `now` is measured anew on them.
-                problem.metric.evaluate(&u, &mut now);
                 break;
             }
             return Err(problem.not_converged(record.iteration, &now));
         };
-        weight = problem.metric.edge_weights(&trial);
-        let next_residual = problem.residual(&trial);
+        weight = problem.metric.edge_weights(&now);
+        let next_residual = problem.residual(&now);
         record.energy += if problem.metric.may_flip() {
             // ∫ (K − K̄) du by the corrected trapezoid: the directional derivative at both ends, and its own derivative δᵀHδ,
             // which is minus the directional derivative at the start because δ solves the system.
@@ -139,12 +142,10 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
             );
             0.5 * step * (slope + next_slope) - step * step / 12.0 * (slope + next_bend)
         } else {
-            // `now` is the scratch of the quadrature: it is replaced right after.
-            problem.energy_change(&u, &direction, step, &mut now)
+            problem.energy_change(&u, &direction, step, &mut scratch)
         };
         u = moved(&u, &direction, step);
         problem.metric.rebase(&mut u);
-        std::mem::swap(&mut now, &mut trial);
         residual = next_residual;
         let last_error = record.max_error;
         record.iteration += 1;
@@ -158,6 +159,7 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
             && record.max_error > 0.5 * last_error
             && spread(&direction) < SYMMETRY_FLOOR;
         if symmetric_floor && problem.separate() {
+            drop(system);
             system = System::new(&problem.unknowns(), None)?;
             polished = 0;
         }
