@@ -90,7 +90,10 @@ pub(crate) fn minimise(problem: &mut Problem) -> Result<Solution, FlowError> {
         if system.flips != problem.metric.flips() {
             system = System::new(&problem.unknowns(), Some(system))?;
         }
-        let hessian = system.assemble(problem.metric.connectivity(), &weight);
+        // Of no use any more where the factor needs the memory.
+        let weight_now = std::mem::take(&mut weight);
+        let hessian = system.assemble(problem.metric.connectivity(), &weight_now);
+        drop(weight_now);
         least = least.min(dot(&residual, &residual).sqrt());
         let taken = if near {
             polished += 1;

@@ -1,10 +1,16 @@
 //! Changes of connectivity: flips and splits. Each keeps every invariant of the structure and the id of
 //! everything that survives.
 
-use super::Connectivity;
+use super::{Arrays, Connectivity};
 use crate::geometry::ids::{EdgeId, FaceId, HalfedgeId, NONE, VertexId};
+use std::sync::Arc;
 
 impl Connectivity {
+    /// Its arrays for itself alone.
+    fn own(&mut self) -> &mut Arrays {
+        Arc::make_mut(&mut self.arrays)
+    }
+
     /// Replaces edge `ab` between faces `abc` and `bad` by `dc`; `None`, and nothing done, on the
     /// boundary and where both sides are the same face.
     ///
@@ -27,33 +33,34 @@ impl Connectivity {
         // Where each outer side goes: c→a and a→d around f, d→b and b→c around g.
         let moves = [(hp, hn), (tn, hp), (tp, tn), (hn, tp)];
         let moved = |x: HalfedgeId| moves.iter().find(|m| m.0 == x).map_or(x, |m| m.1);
-        let firsts = [a, b, c, d].map(|v| (v, self.vertex_halfedge[v]));
+        let firsts = [a, b, c, d].map(|v| (v, self.arrays.vertex_halfedge[v]));
         let sides = moves.map(|(from, to)| {
             let twin = self.twin(from).map(moved);
             (to, self.tail(from), twin, self.edge(from))
         });
+        let own = self.own();
         for (to, tail, twin, edge) in sides {
-            self.tail[to] = tail;
-            self.edge[to] = edge;
-            self.twin[to] = twin.map_or(NONE, HalfedgeId::raw);
+            own.tail[to] = tail;
+            own.edge[to] = edge;
+            own.twin[to] = twin.map_or(NONE, HalfedgeId::raw);
             if let Some(twin) = twin {
-                self.twin[twin] = to.raw();
+                own.twin[twin] = to.raw();
             }
         }
         for (from, _) in moves {
             let to = moved(from);
-            let edge = self.edge[to];
-            let representative = self.edge_halfedge[edge];
-            if self.twin[to] == NONE
-                || (representative != to && self.twin[to] != representative.raw())
+            let edge = own.edge[to];
+            let representative = own.edge_halfedge[edge];
+            if own.twin[to] == NONE
+                || (representative != to && own.twin[to] != representative.raw())
             {
-                self.edge_halfedge[edge] = to;
+                own.edge_halfedge[edge] = to;
             }
         }
-        self.tail[h] = d;
-        self.tail[t] = c;
+        own.tail[h] = d;
+        own.tail[t] = c;
         for (v, first) in firsts {
-            self.vertex_halfedge[v] = if first == h {
+            own.vertex_halfedge[v] = if first == h {
                 moved(tn)
             } else if first == t {
                 moved(hn)
@@ -73,28 +80,28 @@ impl Connectivity {
     pub fn split_edge(&mut self, e: EdgeId) -> EdgeSplit {
         let h = self.edge_halfedge(e);
         let t = self.twin(h);
-        let m = self.vertex_halfedge.push(h);
-        let (e_mb, near) = (self.edge_halfedge.push(h), self.halve(h, m));
+        let m = self.own().vertex_halfedge.push(h);
+        let (e_mb, near) = (self.own().edge_halfedge.push(h), self.halve(h, m));
         let far = t.map(|t| self.halve(t, m));
         // near.new_along runs m → b. On the far side t was b → a: it keeps b → m, far.new_along runs m → a.
         match (t, &far) {
             (Some(t), Some(far)) => {
                 self.pair(h, far.new_along);
                 self.pair(near.new_along, t);
-                self.edge[far.new_along] = e;
-                self.edge[t] = e_mb;
+                self.own().edge[far.new_along] = e;
+                self.own().edge[t] = e_mb;
             }
             _ => {
-                self.twin[h] = NONE;
-                self.twin[near.new_along] = NONE;
+                self.own().twin[h] = NONE;
+                self.own().twin[near.new_along] = NONE;
             }
         }
-        self.edge[h] = e;
-        self.edge[near.new_along] = e_mb;
-        self.edge_halfedge[e] = h;
-        self.edge_halfedge[e_mb] = near.new_along;
+        self.own().edge[h] = e;
+        self.own().edge[near.new_along] = e_mb;
+        self.own().edge_halfedge[e] = h;
+        self.own().edge_halfedge[e_mb] = near.new_along;
         // A boundary vertex m starts at the boundary halfedge m → b.
-        self.vertex_halfedge[m] = near.new_along;
+        self.own().vertex_halfedge[m] = near.new_along;
         EdgeSplit {
             vertex: m,
             sides: std::iter::once(near).chain(far).collect(),
@@ -108,31 +115,32 @@ impl Connectivity {
         let (b, c) = (self.tail(hn), self.tail(hp));
         let new_face = FaceId::new(self.face_count());
         let (outer_twin, outer_edge) = (self.twin(hn), self.edge(hn));
+        let own = self.own();
         for corner in 0..3 {
             let v = [m, b, c][(corner + 3 - k) % 3];
-            self.tail.push(v);
-            self.twin.push(NONE);
-            self.edge.push(outer_edge);
+            own.tail.push(v);
+            own.twin.push(NONE);
+            own.edge.push(outer_edge);
         }
         let at = |offset: usize| HalfedgeId::new(3 * new_face.index() + (k + offset) % 3);
         let (mb, bc, cm) = (at(0), at(1), at(2));
         // b → c moves to the new face.
         match outer_twin {
             Some(twin) => self.pair(bc, twin),
-            None => self.edge_halfedge[outer_edge] = bc,
+            None => self.own().edge_halfedge[outer_edge] = bc,
         }
-        if self.edge_halfedge[outer_edge] == hn {
-            self.edge_halfedge[outer_edge] = bc;
+        if self.arrays.edge_halfedge[outer_edge] == hn {
+            self.own().edge_halfedge[outer_edge] = bc;
         }
-        if self.vertex_halfedge[b] == hn {
-            self.vertex_halfedge[b] = bc;
+        if self.arrays.vertex_halfedge[b] == hn {
+            self.own().vertex_halfedge[b] = bc;
         }
         // m → c in the old face, c → m in the new one.
-        self.tail[hn] = m;
+        self.own().tail[hn] = m;
         self.pair(hn, cm);
-        let spoke = self.edge_halfedge.push(hn);
-        self.edge[hn] = spoke;
-        self.edge[cm] = spoke;
+        let spoke = self.own().edge_halfedge.push(hn);
+        self.own().edge[hn] = spoke;
+        self.own().edge[cm] = spoke;
         HalvedFace {
             old: self.face(h),
             new: new_face,
@@ -142,8 +150,9 @@ impl Connectivity {
     }
 
     fn pair(&mut self, a: HalfedgeId, b: HalfedgeId) {
-        self.twin[a] = b.raw();
-        self.twin[b] = a.raw();
+        let own = self.own();
+        own.twin[a] = b.raw();
+        own.twin[b] = a.raw();
     }
 
     /// Puts a new vertex `m` inside face `abc`: it keeps `a b m`; `m b c` and `a m c` are new, each
@@ -151,20 +160,21 @@ impl Connectivity {
     pub fn split_face(&mut self, f: FaceId) -> FaceSplit {
         let [ab, bc, ca] = self.face_halfedges(f);
         let [a, b, c] = self.face_vertices(f);
-        let m = self.vertex_halfedge.push(ca);
+        let m = self.own().vertex_halfedge.push(ca);
         let first = self.face_count();
         let outer = [
             (bc, self.twin(bc), self.edge(bc)),
             (ca, self.twin(ca), self.edge(ca)),
         ];
+        let (edge, own) = (self.edge(ab), self.own());
         for v in [m, b, c, a, m, c] {
-            self.tail.push(v);
-            self.twin.push(NONE);
-            self.edge.push(self.edge[ab]);
+            own.tail.push(v);
+            own.twin.push(NONE);
+            own.edge.push(edge);
         }
         let at = |face: usize, corner: usize| HalfedgeId::new(3 * (first + face) + corner);
         for ((old, twin, edge), new) in outer.into_iter().zip([at(0, 1), at(1, 2)]) {
-            self.edge[new] = edge;
+            self.own().edge[new] = edge;
             // The face may be glued to itself along these two sides.
             let twin = twin.map(|t| {
                 if t == bc {
@@ -178,21 +188,21 @@ impl Connectivity {
             if let Some(twin) = twin {
                 self.pair(new, twin);
             }
-            if self.edge_halfedge[edge] == old {
-                self.edge_halfedge[edge] = new;
+            if self.arrays.edge_halfedge[edge] == old {
+                self.own().edge_halfedge[edge] = new;
             }
-            let tail = self.tail[new];
-            if self.vertex_halfedge[tail] == old {
-                self.vertex_halfedge[tail] = new;
+            let tail = self.arrays.tail[new];
+            if self.arrays.vertex_halfedge[tail] == old {
+                self.own().vertex_halfedge[tail] = new;
             }
         }
-        self.tail[ca] = m;
+        self.own().tail[ca] = m;
         // Spokes: b m between the old face and the first new one, c m, a m.
         for (x, y) in [(bc, at(0, 0)), (at(0, 2), at(1, 1)), (ca, at(1, 0))] {
             self.pair(x, y);
-            let spoke = self.edge_halfedge.push(x);
-            self.edge[x] = spoke;
-            self.edge[y] = spoke;
+            let spoke = self.own().edge_halfedge.push(x);
+            self.own().edge[x] = spoke;
+            self.own().edge[y] = spoke;
         }
         FaceSplit {
             vertex: m,

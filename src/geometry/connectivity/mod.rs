@@ -29,10 +29,16 @@ pub use edit::{EdgeSplit, FaceSplit, Flip, HalvedFace};
 use crate::geometry::ids::{
     EdgeId, EdgeVec, FaceId, HalfedgeId, HalfedgeVec, NONE, VertexId, VertexVec,
 };
+use std::sync::Arc;
 
-/// Oriented triangulated surface; see the module docs.
+/// Oriented triangulated surface; see the module docs. Copies share their memory until one of them is changed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Connectivity {
+    arrays: Arc<Arrays>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct Arrays {
     tail: HalfedgeVec<VertexId>,
     twin: HalfedgeVec<u32>,
     edge: HalfedgeVec<EdgeId>,
@@ -202,7 +208,7 @@ impl Connectivity {
         for (v, h) in first.enumerate() {
             vertex_halfedge.push(h.ok_or(ConnectivityError::UnusedVertex { vertex: v.raw() })?);
         }
-        let connectivity = Connectivity {
+        let arrays = Arrays {
             tail,
             twin: twin
                 .iter()
@@ -211,6 +217,9 @@ impl Connectivity {
             edge,
             edge_halfedge,
             vertex_halfedge,
+        };
+        let connectivity = Connectivity {
+            arrays: Arc::new(arrays),
         };
         for v in connectivity.vertices() {
             if connectivity.outgoing(v).count() != outgoing_count[v] {
@@ -222,19 +231,19 @@ impl Connectivity {
 
     /// Number of vertices.
     pub fn vertex_count(&self) -> usize {
-        self.vertex_halfedge.len()
+        self.arrays.vertex_halfedge.len()
     }
     /// Number of edges.
     pub fn edge_count(&self) -> usize {
-        self.edge_halfedge.len()
+        self.arrays.edge_halfedge.len()
     }
     /// Number of faces.
     pub fn face_count(&self) -> usize {
-        self.tail.len() / 3
+        self.arrays.tail.len() / 3
     }
     /// Number of halfedges, three a face.
     pub fn halfedge_count(&self) -> usize {
-        self.tail.len()
+        self.arrays.tail.len()
     }
     /// All vertices.
     pub fn vertices(&self) -> impl ExactSizeIterator<Item = VertexId> + use<> {
@@ -304,58 +313,58 @@ impl Connectivity {
     /// The same edge in the other direction; `None` on the boundary.
     #[inline]
     pub fn twin(&self, h: HalfedgeId) -> Option<HalfedgeId> {
-        let t = self.twin[h];
+        let t = self.arrays.twin[h];
         (t != NONE).then(|| HalfedgeId::new(t as usize))
     }
     /// The vertex a halfedge leaves.
     #[inline]
     pub fn tail(&self, h: HalfedgeId) -> VertexId {
-        self.tail[h]
+        self.arrays.tail[h]
     }
     /// The vertex a halfedge enters.
     #[inline]
     pub fn head(&self, h: HalfedgeId) -> VertexId {
-        self.tail[self.next(h)]
+        self.arrays.tail[self.next(h)]
     }
     /// The vertex of the face that is on neither end of the halfedge.
     #[inline]
     pub fn apex(&self, h: HalfedgeId) -> VertexId {
-        self.tail[self.prev(h)]
+        self.arrays.tail[self.prev(h)]
     }
     /// The edge of a halfedge.
     #[inline]
     pub fn edge(&self, h: HalfedgeId) -> EdgeId {
-        self.edge[h]
+        self.arrays.edge[h]
     }
     /// One halfedge of an edge, the same one as long as the connectivity does not change.
     #[inline]
     pub fn edge_halfedge(&self, e: EdgeId) -> HalfedgeId {
-        self.edge_halfedge[e]
+        self.arrays.edge_halfedge[e]
     }
     /// The two ends of an edge, tail of its halfedge first.
     #[inline]
     pub fn edge_vertices(&self, e: EdgeId) -> [VertexId; 2] {
-        let h = self.edge_halfedge[e];
+        let h = self.arrays.edge_halfedge[e];
         [self.tail(h), self.head(h)]
     }
     /// The first outgoing halfedge of a vertex: the boundary one where there is one.
     #[inline]
     pub fn vertex_halfedge(&self, v: VertexId) -> HalfedgeId {
-        self.vertex_halfedge[v]
+        self.arrays.vertex_halfedge[v]
     }
     /// True where the edge has one face only.
     #[inline]
     pub fn is_boundary_edge(&self, e: EdgeId) -> bool {
-        self.twin[self.edge_halfedge[e]] == NONE
+        self.arrays.twin[self.arrays.edge_halfedge[e]] == NONE
     }
     /// True where the vertex lies on a boundary loop.
     #[inline]
     pub fn is_boundary_vertex(&self, v: VertexId) -> bool {
-        self.twin[self.vertex_halfedge[v]] == NONE
+        self.arrays.twin[self.arrays.vertex_halfedge[v]] == NONE
     }
     /// True where there is no boundary.
     pub fn is_closed(&self) -> bool {
-        self.twin.iter().all(|&t| t != NONE)
+        self.arrays.twin.iter().all(|&t| t != NONE)
     }
 
     /// The next outgoing halfedge counterclockwise around the tail; `None` past a boundary.
@@ -371,7 +380,7 @@ impl Connectivity {
     /// The outgoing halfedges of a vertex, one a face corner, counterclockwise from the first.
     /// At a boundary vertex the edge that closes the fan has no outgoing halfedge.
     pub fn outgoing(&self, v: VertexId) -> impl Iterator<Item = HalfedgeId> + '_ {
-        let start = self.vertex_halfedge[v];
+        let start = self.arrays.vertex_halfedge[v];
         std::iter::successors(Some(start), move |&h| {
             self.rotate_ccw(h).filter(|&n| n != start)
         })
@@ -395,7 +404,7 @@ impl Connectivity {
         let mut seen = HalfedgeVec::filled(false, self.halfedge_count());
         let mut loops = Vec::new();
         for start in self.halfedges() {
-            if self.twin[start] != NONE || seen[start] {
+            if self.arrays.twin[start] != NONE || seen[start] {
                 continue;
             }
             let mut chain = Vec::new();
@@ -403,7 +412,7 @@ impl Connectivity {
             while !seen[h] {
                 seen[h] = true;
                 chain.push(h);
-                h = self.vertex_halfedge[self.head(h)];
+                h = self.arrays.vertex_halfedge[self.head(h)];
             }
             loops.push(chain);
         }
