@@ -186,14 +186,16 @@ fn rebuild(request: &RebuildRequest) -> Result<RebuildResult, Failure> {
     })
 }
 
-fn fit(request: &FitRequest) -> Result<FitResult, Failure> {
-    let fitted = job::fit::fit(&request.input, &request.params);
+fn fit(request: &FitRequest, observer: &dyn Observer) -> Result<FitResult, Failure> {
+    let fitted = job::fit::fit(&request.input, &request.params, observer);
     let fitted = fitted.map_err(|error| Failure::from(&error))?;
+    observer.stage("write", 0, 1);
     let written = fitted.write(&request.root, &request.name);
     written.map_err(|error| Failure::from(&error))?;
     Ok(FitResult {
         text: fitted.to_string(),
         json: serde_json::json!(fitted.document()),
+        unfitted: fitted.unfitted,
     })
 }
 

@@ -97,7 +97,7 @@ fn fitted(model: &Path, cells: usize) -> Result<FittedAsset, Failed> {
         size: Size::Cells(cells),
         ..FitParams::default()
     };
-    Ok(fit(model, &params)?)
+    Ok(fit(model, &params, &())?)
 }
 
 /// At 2,000 and at 8,000 cells; tells all figures, so that a run makes a table.

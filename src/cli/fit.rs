@@ -4,14 +4,15 @@ use super::arguments::{Fit, Global, LogFormat, Tolerance};
 use super::check::show_failure;
 use super::inputs::start_threads;
 use super::problem::Problem;
+use super::progress::Progress;
 use super::work::{FitRequest, Work};
 use super::{exit, interrupt, panics, terminal};
 use affine_atlas::config::Config;
-use affine_atlas::job::fit::{FitParams, Size};
+use affine_atlas::job::fit::{FitParams, Size, Unfitted};
 use affine_atlas::outcome::{Failure, FailureKind};
 use std::path::{Path, PathBuf};
 
-/// Fits one asset. Exit code 1 where it has no surfaces.
+/// Fits one asset. Exit code 1 where a component of it has no surface.
 pub fn run(fit: &Fit, global: &Global, work: &Work) -> Result<u8, Problem> {
     let is_folder = fit.input.is_dir();
     let out = match &fit.out {
@@ -49,21 +50,31 @@ pub fn run(fit: &Fit, global: &Global, work: &Work) -> Result<u8, Problem> {
             unit: fit.unit,
         },
     };
-    let fitted = panics::catch(|| (work.fit)(&request)).unwrap_or_else(|panic| {
+    let progress = Progress::new(global, 1);
+    let observer = progress.asset(&request.name, 0);
+    let fitted = panics::catch(|| (work.fit)(&request, &observer)).unwrap_or_else(|panic| {
         Err(Failure {
             kind: FailureKind::Internal,
             message: panic,
         })
     });
+    progress.finish();
     match fitted {
         Ok(result) => {
+            for Unfitted { name, failure } in &result.unfitted {
+                show_failure(name, failure, global.log_format);
+            }
             if fit.json {
                 terminal::print(&format!("{:#}\n", result.json));
             } else if !global.quiet {
                 terminal::print(&format!("{}written to {}\n", result.text, out.display()));
             }
-            Ok(exit::GOOD)
+            Ok(match result.unfitted.is_empty() {
+                true => exit::GOOD,
+                false => exit::SOME_FAILED,
+            })
         }
+        Err(_) if interrupt::requested() => Ok(exit::INTERRUPTED),
         Err(failure) => {
             let name = fit.input.display().to_string();
             show_failure(&name, &failure, global.log_format);

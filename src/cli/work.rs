@@ -8,7 +8,7 @@ use affine_atlas::batch::worker::Job;
 use affine_atlas::batch::{Batch, Task, Watcher};
 use affine_atlas::config::Config;
 use affine_atlas::config::assets::Asset;
-use affine_atlas::job::fit::FitParams;
+use affine_atlas::job::fit::{FitParams, Unfitted};
 use affine_atlas::job::texture::TextureParams;
 use affine_atlas::observe::Observer;
 use affine_atlas::outcome::{AssetOutcome, Failure};
@@ -40,7 +40,7 @@ pub struct Work {
     /// Makes a mesh again from an asset's folder.
     pub rebuild: fn(&RebuildRequest) -> Result<RebuildResult, Failure>,
     /// Fits spline surfaces to a mesh or an asset's folder and writes them into a folder.
-    pub fit: fn(&FitRequest) -> Result<FitResult, Failure>,
+    pub fit: fn(&FitRequest, &dyn Observer) -> Result<FitResult, Failure>,
     /// Lays a pattern over an asset's surface and writes the texture into a folder.
     pub texture: fn(&TextureRequest) -> Result<TextureResult, Failure>,
     /// Says why an asset failed or is distorted.
@@ -132,6 +132,8 @@ pub struct FitResult {
     pub text: String,
     /// The same for programs.
     pub json: serde_json::Value,
+    /// Components without a surface.
+    pub unfitted: Vec<Unfitted>,
 }
 
 /// What `texture` is asked for.

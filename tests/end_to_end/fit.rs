@@ -117,6 +117,30 @@ fn ends_of_a_cylinder_have_no_cell_with_a_corner_of_half_a_turn() {
     assert_eq!(component["corners"], 0);
 }
 
+/// A component without a surface does not spoil the others: it is named, and the exit code says so.
+#[test]
+fn a_bad_component_is_named_and_the_others_are_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let into = folder.path().join("surfaces");
+    let mesh = Path::new("fixtures/bad/one-bad-component.obj");
+    let output = fit(mesh, &into, &["--cells", "60"]);
+    assert_eq!(output.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.contains("failed: component-001"), "{said}");
+    assert!(said.contains("surfaces: flow (component 3 of 3)"), "{said}");
+    let figures = figures(&into);
+    let names = |key: &str| -> Vec<Value> {
+        let list = figures[key].as_array().expect("a list").iter();
+        list.map(|c| c["name"].clone()).collect()
+    };
+    assert_eq!(names("components"), ["component-000", "component-002"]);
+    assert_eq!(names("unfitted"), ["component-001"]);
+    let files = files(&into);
+    assert!(files.contains_key("component-002.step") && !files.contains_key("component-001.step"));
+    let page = std::fs::read_to_string(into.join("fit.html")).expect("there");
+    assert!(page.contains("No surface:"));
+}
+
 #[test]
 fn tolerances_are_kept() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,4 +1,4 @@
-//! Ctrl-C in the middle of a build.
+//! Ctrl-C in the middle of a build, and of a fit.
 
 use crate::OF_THE_RUN;
 use crate::command::{build_into, program};
@@ -57,7 +57,7 @@ fn write_large(path: &Path) {
     std::fs::write(path, obj).expect("written");
 }
 
-/// Sends the signal when a line on standard error names the stage.
+/// Interrupts a build in this stage.
 fn interrupt_at(stage: &str) {
     let out = tempfile::tempdir().expect("a temporary folder");
     let input = tempfile::tempdir().expect("a temporary folder");
@@ -69,22 +69,28 @@ fn interrupt_at(stage: &str) {
     let before = files(&atlas);
 
     write_large(&mesh);
-    let mut child = program()
-        .arg("build")
-        .arg(&mesh)
-        .arg("--out")
-        .arg(out.path())
+    let mut command = program();
+    command.arg("build").arg(&mesh).arg("--out").arg(out.path());
+    interrupt(command, &format!("mesh: {stage}"));
+    assert!(files(&atlas) == before, "the older atlas was touched");
+    let is_known = |name: &String| name == "mesh" || OF_THE_RUN.contains(&name.as_str());
+    let left: Vec<String> = names(out.path()).filter(|name| !is_known(name)).collect();
+    assert!(left.is_empty(), "{left:?} stayed behind");
+}
+
+/// Sends the signal when a line on standard error says that a stage begins.
+fn interrupt(mut command: Command, entered: &str) {
+    let mut child = command
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()
         .expect("the program starts");
     let mut lines = BufReader::new(child.stderr.take().expect("piped")).lines();
-    let entered = format!("mesh: {stage}");
     let seen = lines
         .by_ref()
         .map_while(Result::ok)
-        .any(|line| line.contains(&entered));
-    assert!(seen, "never came to {stage}");
+        .any(|line| line.contains(entered));
+    assert!(seen, "never came to {entered}");
     // The shell's own `kill`: a bare machine may have no other.
     let kill = format!("kill -INT {}", child.id());
     let sent = Command::new("sh").args(["-c", &kill]).status();
@@ -96,19 +102,24 @@ fn interrupt_at(stage: &str) {
         said.iter().any(|line| line.contains("stopping")),
         "{said:?}"
     );
+}
 
-    assert!(files(&atlas) == before, "the older atlas was touched");
-    let left: Vec<String> = std::fs::read_dir(out.path())
-        .expect("a folder")
-        .map(|e| {
-            e.expect("readable")
-                .file_name()
-                .to_string_lossy()
-                .into_owned()
-        })
-        .filter(|name| name != "mesh" && !OF_THE_RUN.contains(&name.as_str()))
-        .collect();
-    assert!(left.is_empty(), "{left:?} stayed behind");
+/// Of what lies in a folder.
+fn names(folder: &Path) -> impl Iterator<Item = String> {
+    let entries = std::fs::read_dir(folder).expect("a folder");
+    entries.map(|e| e.expect("readable").file_name().display().to_string())
+}
+
+#[test]
+fn while_a_surface_is_fitted() {
+    let out = tempfile::tempdir().expect("a temporary folder");
+    let mesh = out.path().join("mesh.obj");
+    write_large(&mesh);
+    let mut command = program();
+    command.arg("fit").arg(&mesh).arg("--out");
+    command.arg(out.path().join("surface"));
+    interrupt(command, "surface: flow");
+    assert_eq!(names(out.path()).collect::<Vec<_>>(), ["mesh.obj"]);
 }
 
 #[test]

@@ -19,8 +19,19 @@ pub struct Document {
     pub unit: String,
     /// Most by which normals of faces in the STEP file were to differ beside irregular points, degrees.
     pub angle_degrees: f64,
-    /// One a component.
+    /// One a component that has a surface.
     pub components: Vec<Component>,
+    /// The others.
+    pub unfitted: Vec<Unfitted>,
+}
+
+/// A component without a surface.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Unfitted {
+    /// Name.
+    pub name: String,
+    /// Why it has none.
+    pub reason: String,
 }
 
 /// Figures of one surface.

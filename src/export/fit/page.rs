@@ -1,6 +1,6 @@
 //! `fit.html`: figures and zebra stripes of spline surfaces, on a page that needs no network.
 
-use super::document::{Component, Document};
+use super::document::{Component, Document, Unfitted};
 use crate::export::html::{BESIDE, escape, figure, link, page};
 use crate::export::pictures::painted;
 use crate::geometry::mesh::Mesh;
@@ -53,6 +53,10 @@ pub fn text(title: &str, document: &Document, pictures: &[Option<String>]) -> St
             );
         }
         table(&mut body, component, &document.unit);
+    }
+    for Unfitted { name, reason } in &document.unfitted {
+        let (name, reason) = (escape(name), escape(reason));
+        let _ = writeln!(body, "<h2>{name}</h2>\n<p>No surface: {reason}</p>");
     }
     page(title, "", &body, &[], BESIDE)
 }

@@ -7,12 +7,14 @@ mod search;
 mod text;
 mod write;
 
+use super::components::Observed;
 use super::{BuildError, folder_name};
 use crate::config::ConfigError;
 use crate::export::ExportError;
-use crate::export::fit::document::{Component, Document};
+use crate::export::fit::document::{self, Component, Document};
 use crate::export::step::LengthUnit;
 use crate::grid::GridError;
+use crate::observe::Observer;
 use crate::outcome::{Failure, FailureKind};
 use crate::read::atlas::{FolderError, component_folders};
 use crate::read::gridded::read_gridded;
@@ -69,11 +71,22 @@ pub struct FittedComponent {
     pub patches: Patches,
 }
 
+/// A component without a surface.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unfitted {
+    /// Name.
+    pub name: String,
+    /// Why.
+    pub failure: Failure,
+}
+
 /// The surfaces of an asset.
 #[derive(Clone, Debug)]
 pub struct FittedAsset {
-    /// One a component.
+    /// One a component that has one.
     pub components: Vec<FittedComponent>,
+    /// The others.
+    pub unfitted: Vec<Unfitted>,
     /// What was asked for.
     pub params: FitParams,
 }
@@ -153,29 +166,68 @@ impl From<&FitAssetError> for Failure {
     }
 }
 
-/// Fits the surfaces of every component of a mesh, or of an asset's folder.
+/// Fits the surfaces of every component of a mesh, or of an asset's folder. One that has none does not spoil the others.
 ///
 /// # Errors
-/// See [`FitAssetError`].
-pub fn fit(input: &Path, params: &FitParams) -> Result<FittedAsset, FitAssetError> {
+/// What concerns the whole asset, and where no component has a surface, what is wrong with the first; see [`FitAssetError`].
+pub fn fit(
+    input: &Path,
+    params: &FitParams,
+    observer: &dyn Observer,
+) -> Result<FittedAsset, FitAssetError> {
     let splines = match input.is_dir() {
-        true => of_folder(input, params)?,
-        false => search::of_mesh(input, params)?,
+        true => of_folder(input, params, observer)?,
+        false => search::of_mesh(input, params, observer)?,
     };
-    let components = splines.into_iter().map(|(name, spline)| {
-        let (faces, patches) = spline.b_splines(params.angle).map_err(of_spline(&name))?;
-        Ok(FittedComponent {
-            name,
-            spline,
-            faces,
-            patches,
-        })
-    });
-    Ok(FittedAsset {
-        components: components.collect::<Result<_, FitAssetError>>()?,
-        params: *params,
-    })
+    let count = splines.len();
+    let (mut components, mut unfitted, mut first) = (Vec::new(), Vec::new(), None);
+    for (index, (name, spline)) in splines.into_iter().enumerate() {
+        enter(observer, "B-splines", index, count)?;
+        let fitted = spline.and_then(|spline| {
+            let (faces, patches) = spline.b_splines(params.angle).map_err(of_spline(&name))?;
+            Ok((spline, faces, patches))
+        });
+        match fitted {
+            Ok((spline, faces, patches)) => components.push(FittedComponent {
+                name,
+                spline,
+                faces,
+                patches,
+            }),
+            Err(error) => {
+                let failure = Failure::from(&error);
+                unfitted.push(Unfitted { name, failure });
+                first.get_or_insert(error);
+            }
+        }
+    }
+    match first {
+        Some(error) if components.is_empty() => Err(error),
+        _ => Ok(FittedAsset {
+            components,
+            unfitted,
+            params: *params,
+        }),
+    }
 }
+
+/// Tells that a stage begins, unless the job was to stop.
+fn enter(
+    observer: &dyn Observer,
+    stage: &'static str,
+    component: usize,
+    components: usize,
+) -> Result<(), BuildError> {
+    Observed {
+        observer,
+        component,
+        components,
+    }
+    .enter(stage)
+}
+
+/// Of every component its name and surface, or why it has none.
+type Splines = Vec<(String, Result<Spline, FitAssetError>)>;
 
 fn of_spline(name: &str) -> impl Fn(SplineError) -> FitAssetError {
     let name = name.to_owned();
@@ -185,17 +237,22 @@ fn of_spline(name: &str) -> impl Fn(SplineError) -> FitAssetError {
     }
 }
 
-fn of_folder(folder: &Path, params: &FitParams) -> Result<Vec<(String, Spline)>, FitAssetError> {
+fn of_folder(
+    folder: &Path,
+    params: &FitParams,
+    observer: &dyn Observer,
+) -> Result<Splines, FitAssetError> {
     let folders = component_folders(folder)?;
     if params.size != Size::Default {
         return Err(FitAssetError::HasGrid {
             path: folder.to_owned(),
         });
     }
-    let splines = folders.iter().map(|folder| {
+    let splines = folders.iter().enumerate().map(|(index, folder)| {
+        enter(observer, "spline", index, folders.len())?;
         let name = folder_name(folder);
-        let gridded = gridded(folder)?;
-        let spline = spline::fit(&gridded).map_err(of_spline(&name))?;
+        let gridded = gridded(folder).map_err(FitAssetError::from);
+        let spline = gridded.and_then(|gridded| spline::fit(&gridded).map_err(of_spline(&name)));
         Ok((name, spline))
     });
     splines.collect()
@@ -219,6 +276,15 @@ pub fn gridded(folder: &Path) -> Result<Gridded, FolderError> {
     })
 }
 
+impl Unfitted {
+    fn described(&self) -> document::Unfitted {
+        document::Unfitted {
+            name: self.name.clone(),
+            reason: self.failure.message.clone(),
+        }
+    }
+}
+
 impl FittedAsset {
     /// All figures.
     pub fn document(&self) -> Document {
@@ -238,6 +304,7 @@ impl FittedAsset {
             unit: self.params.unit.name().to_owned(),
             angle_degrees: self.params.angle.to_degrees(),
             components: components.collect(),
+            unfitted: self.unfitted.iter().map(Unfitted::described).collect(),
         }
     }
 }

@@ -1,12 +1,13 @@
 //! Spline surfaces of a mesh: a grid as fine as asked for, on one flat metric.
 
-use super::{FitAssetError, FitParams, Size, of_spline};
+use super::{FitAssetError, FitParams, Size, Splines, enter, of_spline};
 use crate::config::{self, Config};
 use crate::export::folder::component_name;
 use crate::flow::cones;
 use crate::grid::{self, GridError, MOST_CELLS, Spacing};
 use crate::job::charting::{Charting, chart};
 use crate::job::{BuildError, shares};
+use crate::observe::Observer;
 use crate::read;
 use crate::repair::{self, Component};
 use crate::spline::{self, Gridded, Spline};
@@ -21,17 +22,23 @@ const GROWTH: [f64; 2] = [1.5, 6.0];
 /// Tries between the finest that is not near enough and the coarsest that is.
 const BISECTIONS: usize = 3;
 
-/// Of every component its name and surface.
+/// Surfaces of all components.
+///
+/// # Errors
+/// What concerns the whole mesh.
 pub(super) fn of_mesh(
     path: &Path,
     params: &FitParams,
-) -> Result<Vec<(String, Spline)>, FitAssetError> {
+    observer: &dyn Observer,
+) -> Result<Splines, FitAssetError> {
     let mut keys = vec!["images.domain=grid".to_owned()];
     if let Size::Cells(cells) = params.size {
         keys.push(format!("grid.cells={cells}"));
     }
     let config = config::defaults(&keys)?.config;
+    observer.stage("read", 0, 1);
     let asset = read::read(path, &config.limits).map_err(BuildError::from)?;
+    observer.stage("repair", 0, 1);
     let repaired = repair::repair(&asset.soup, &config.repair).map_err(BuildError::from)?;
     let config = config.resolved()?;
     let requests = cones::assign(&repaired, &config.cones, &config.boundary, &config.features);
@@ -48,12 +55,14 @@ pub(super) fn of_mesh(
             _ => component_name(index),
         };
         let config = shares::of_share(&config, share).map_err(BuildError::from)?;
+        let enter = |stage| enter(observer, stage, index, count);
         let fitted = |component: Component, spacing: Spacing| {
-            let charting = chart(component, &requests, &config, spacing, &(), &|_| Ok(()))?;
+            let charting = chart(component, &requests, &config, spacing, observer, &enter)?;
+            let on = |cells: usize| one(&charting, &config, &name, cells, &enter);
             match params.size {
-                Size::Default | Size::Cells(_) => one(&charting, &config, &name, config.grid.cells),
-                Size::OfDiagonal(part) => coarsest(&charting, &config, &name, |_| part),
-                Size::Length(length) => coarsest(&charting, &config, &name, |d| length / d),
+                Size::Default | Size::Cells(_) => on(config.grid.cells),
+                Size::OfDiagonal(part) => coarsest(&on, &name, |_| part),
+                Size::Length(length) => coarsest(&on, &name, |d| length / d),
             }
         };
         let spacings = grid::spacings(config.grid.cells);
@@ -66,7 +75,11 @@ pub(super) fn of_mesh(
             }
             spline = fitted(component.clone(), spacing);
         }
-        splines.push((name.clone(), spline?));
+        if let Err(FitAssetError::Build(BuildError::Cancelled)) = spline {
+            return Err(BuildError::Cancelled.into());
+        }
+        observer.finished(index, count);
+        splines.push((name.clone(), spline));
     }
     Ok(splines)
 }
@@ -77,24 +90,26 @@ fn one(
     config: &Config,
     name: &str,
     cells: usize,
+    enter: &impl Fn(&'static str) -> Result<(), BuildError>,
 ) -> Result<Spline, FitAssetError> {
+    enter("grid")?;
     let gridded = gridded(charting, config, cells).map_err(|source| FitAssetError::Grid {
         name: name.to_owned(),
         source,
     })?;
+    enter("spline")?;
     spline::fit(&gridded).map_err(of_spline(name))
 }
 
-/// The surface on the coarsest grid with which it is near enough; `tolerance` is a part of the diagonal, which it is told.
+/// The surface on the coarsest grid with which it is near enough; `on` gives it on a grid of about so many cells, `tolerance` is a part of the diagonal, which it is told.
 fn coarsest(
-    charting: &Charting,
-    config: &Config,
+    on: &impl Fn(usize) -> Result<Spline, FitAssetError>,
     name: &str,
     tolerance: impl Fn(f64) -> f64,
 ) -> Result<Spline, FitAssetError> {
     let (mut cells, mut too_coarse) = (FIRST, 0);
     let mut near = loop {
-        let tried = one(charting, config, name, cells);
+        let tried = on(cells);
         let growth = match &tried {
             Ok(spline) => {
                 let (off, wanted) = (
@@ -127,7 +142,7 @@ fn coarsest(
         if too_coarse == 0 || middle <= too_coarse || middle >= cells {
             break;
         }
-        match one(charting, config, name, middle) {
+        match on(middle) {
             Ok(spline) if spline.errors.max <= tolerance(spline.diagonal) * spline.diagonal => {
                 (near, cells) = (spline, middle);
             }
