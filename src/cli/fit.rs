@@ -51,7 +51,9 @@ pub fn run(fit: &Fit, global: &Global, work: &Work) -> Result<u8, Problem> {
         },
     };
     let progress = Progress::new(global, 1);
-    let observer = progress.asset(&request.name, 0);
+    let stem = fit.input.file_stem().unwrap_or(fit.input.as_os_str());
+    let stem = stem.to_string_lossy();
+    let observer = progress.asset(&stem, 0);
     let fitted = panics::catch(|| (work.fit)(&request, &observer)).unwrap_or_else(|panic| {
         Err(Failure {
             kind: FailureKind::Internal,

@@ -423,7 +423,10 @@ fn rebuild_without_a_folder_or_a_glb() {
 #[test]
 fn fit_without_a_mesh_or_a_name() {
     let folder = folder();
-    insta::assert_snapshot!(refusal(folder.path(), &["fit", "nowhere.obj"], 1), @"failed: nowhere.obj (input): nowhere.obj: cannot be read (it does not exist); check that the file exists and that you may read it");
+    insta::assert_snapshot!(refusal(folder.path(), &["fit", "nowhere.obj"], 1), @r"
+    [1/1] nowhere: read
+    failed: nowhere.obj (input): nowhere.obj: cannot be read (it does not exist); check that the file exists and that you may read it
+    ");
     insta::assert_snapshot!(refusal(folder.path(), &["fit", ".", "-o", ".."], 2), @r"
     error: .. does not end in the name of a folder to write
     help: name it with `--out FOLDER`

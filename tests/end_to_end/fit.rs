@@ -127,7 +127,10 @@ fn a_bad_component_is_named_and_the_others_are_written() {
     assert_eq!(output.status.code(), Some(1));
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(said.contains("failed: component-001"), "{said}");
-    assert!(said.contains("surfaces: flow (component 3 of 3)"), "{said}");
+    assert!(
+        said.contains("one-bad-component: cones (component 1 of 3)"),
+        "{said}"
+    );
     let figures = figures(&into);
     let names = |key: &str| -> Vec<Value> {
         let list = figures[key].as_array().expect("a list").iter();

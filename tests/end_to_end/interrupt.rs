@@ -118,7 +118,7 @@ fn while_a_surface_is_fitted() {
     let mut command = program();
     command.arg("fit").arg(&mesh).arg("--out");
     command.arg(out.path().join("surface"));
-    interrupt(command, "surface: flow");
+    interrupt(command, "mesh: flow");
     assert_eq!(names(out.path()).collect::<Vec<_>>(), ["mesh.obj"]);
 }
 
