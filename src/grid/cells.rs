@@ -1,6 +1,6 @@
 //! Cells that fold where their edges are drawn straight, unfolded.
 //!
-//! *Enters:* a relaxed [`GridMap`] and the quad mesh. *Leaves:* the same with moved vertices about cells of which a corner looks away from the surface, or nearly. *Guaranteed:* no face is turned over; cones stay, lines stay on their lattice lines; the energy of
+//! *Enters:* a relaxed [`GridMap`] and the quad mesh. *Leaves:* the same with moved vertices about cells of which a corner looks away from the surface, or nearly. *Guaranteed:* no face is turned over, or comes below a twentieth of its area; cones stay, lines stay on their lattice lines; the energy of
 //! these cells is no greater than before. *Not guaranteed:* that none folds: where the surface bends within a cell, or about cones that are nearer than a cell, there may be no such place.
 //!
 //! The energy of a map knows faces, not cells: across a ridge, or beside three edges that meet, a cell without distortion on the surface may fold in space. That of a corner with edges a and b, of which h = n · (a × b) with the normal n of the
@@ -17,8 +17,8 @@ use super::spots::{Spot, locate, normals};
 use super::squares::Squares;
 use super::system::{Derivatives, Equations};
 use super::triangle::double_area;
-use crate::geometry::ids::{FaceId, VertexId};
-use crate::geometry::mesh::{cross, dot, norm, sub};
+use crate::geometry::ids::{FaceId, FaceVec, VertexId};
+use crate::geometry::mesh::{cross, dot, norm, sub, triangle_area};
 use crate::observe::part;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -38,8 +38,10 @@ const LEAST_GAIN: f64 = 1e-3;
 /// Cells that a point moves at most in a step.
 const REACH: f64 = 0.4;
 const MOST_HALVINGS: usize = 12;
-/// Part of its area on the grid that a face keeps in a step.
+/// Part of its area on the grid that a face keeps in a step, …
 const KEPT: f64 = 0.1;
+/// … and of its area on the surface that it keeps in all, unless it had less: what lies in a crevice that a cell passes over is on the grid all the same.
+const LEAST_AREA: f64 = 0.05;
 /// Vertices or faces that a piece of work has at least.
 const PIECE: usize = 1024;
 
@@ -185,6 +187,7 @@ pub(super) fn unfold(
         return Ok(unfolded);
     }
     let seen_from = Corners::new(map);
+    let least = least_areas(map, &seen_from, unit);
     let mut equations = Equations::new(corners(&cells), &near)?;
     let mut before = energy(&cells, &spots, &|_| [0.0; 2]);
     for steps in 0..MOST_STEPS {
@@ -206,7 +209,7 @@ pub(super) fn unfold(
         let vertices = map.sheet.fine.connectivity.vertices();
         let places: Vec<[f64; 2]> = vertices.map(|v| map.place(v)).collect();
         let step = follow(map, mesh, &squares, &spots, &step);
-        let moved = without_harm(map, &seen_from, &places, &step, length);
+        let moved = without_harm(map, &seen_from, &least, &places, &step, length);
         let before_step = map.anchors.clone();
         let mut turning = Turning::new(map);
         turning.see(&seen_from, &moved);
@@ -236,10 +239,25 @@ pub(super) fn unfold(
     Ok(unfolded)
 }
 
-/// Places of vertices after a step, shorter where a face would lose its area.
+/// Twice the area on the grid below which no face shall come.
+fn least_areas(map: &GridMap, seen_from: &Corners, unit: &Units) -> FaceVec<f64> {
+    let (fine, vertices) = (&map.sheet.fine, map.sheet.fine.connectivity.vertices());
+    let places: Vec<[f64; 2]> = vertices.map(|v| map.place(v)).collect();
+    let of_face = |f: FaceId| {
+        let corners = fine.connectivity.face_vertices(f).map(|v| fine.position[v]);
+        let size = unit.of(fine.parent[f]);
+        let natural = 2.0 * triangle_area(corners) / (size * size);
+        let now = double_area(seen_from.corners(f, &places));
+        (LEAST_AREA * natural).min(now)
+    };
+    fine.connectivity.faces().map(of_face).collect()
+}
+
+/// Places of vertices after a step, shorter where a face would lose its area; `least` is twice what it must have.
 fn without_harm(
     map: &GridMap,
     seen_from: &Corners,
+    least: &FaceVec<f64>,
     places: &[[f64; 2]],
     step: &[[f64; 2]],
     length: f64,
@@ -251,7 +269,7 @@ fn without_harm(
         .collect();
     let harmed = |f: FaceId, moved: &[[f64; 2]]| {
         let [old, new] = [places, moved].map(|p| double_area(seen_from.corners(f, p)));
-        !(new >= KEPT * old && new > 0.0)
+        !(new >= (KEPT * old).max(least[f]) && new > 0.0)
     };
     let c = &map.sheet.fine.connectivity;
     let all: Vec<FaceId> = c.faces().collect();

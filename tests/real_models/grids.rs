@@ -14,6 +14,8 @@ const MISS: f64 = 0.1;
 const CELLS_OF_POINT: usize = 10;
 /// Most irregular points that a number of cells is asked of.
 const MOST_POINTS: usize = 60;
+/// Most that the mean of ‖J‖² + ‖J⁻¹‖² may be: faces that nothing is left of on the grid make it thousands.
+const MOST_DIRICHLET: f64 = 20.0;
 
 /// Builds a model on grids by `build`, which takes settings and gives a folder and its `atlas.json`. Prints a line of a table for every number of cells.
 pub fn grids<K, E: ToString>(
@@ -40,7 +42,7 @@ pub fn grids<K, E: ToString>(
     Ok(())
 }
 
-/// About as many cells as were asked for, none turned over. Prints a line of a table.
+/// About as many cells as were asked for, none turned over, and hardly any squeezed. Prints a line of a table.
 pub fn wanted(model: &Path, json: &Value, cells: usize) -> Result<(), String> {
     let grid = &json["grid"];
     let number = |value: &Value| value.as_u64().map(|n| n as usize);
@@ -54,6 +56,9 @@ pub fn wanted(model: &Path, json: &Value, cells: usize) -> Result<(), String> {
     );
     if grid["turned_over"] != 0 {
         return Err(format!("{} faces turned over", grid["turned_over"]));
+    }
+    if dirichlet.as_f64().is_none_or(|mean| mean > MOST_DIRICHLET) {
+        return Err(format!("mean of ‖J‖² + ‖J⁻¹‖²: {dirichlet}"));
     }
     let is_asked = cells >= CELLS_OF_POINT * points && points <= MOST_POINTS;
     if is_asked && (found as f64 / cells as f64 - 1.0).abs() > MISS {
