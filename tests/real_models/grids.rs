@@ -15,7 +15,7 @@ const CELLS_OF_POINT: usize = 10;
 /// Most irregular points that a number of cells is asked of.
 const MOST_POINTS: usize = 60;
 /// Most that the mean of ‖J‖² + ‖J⁻¹‖² may be: faces that nothing is left of on the grid make it thousands.
-const MOST_DIRICHLET: f64 = 20.0;
+const MOST_DIRICHLET: f64 = 50.0;
 
 /// Builds a model on grids by `build`, which takes settings and gives a folder and its `atlas.json`. Prints a line of a table for every number of cells.
 pub fn grids<K, E: ToString>(
