@@ -7,6 +7,7 @@ pub(crate) mod fill;
 pub mod frame;
 pub mod ids;
 pub mod mesh;
+pub(crate) mod morton;
 pub(crate) mod polygon;
 pub(crate) mod subdivision;
 pub mod triangle;

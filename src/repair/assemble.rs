@@ -4,10 +4,15 @@ use crate::geometry::connectivity::Connectivity;
 use crate::geometry::frame::Frame;
 use crate::geometry::ids::{EdgeId, HalfedgeId, HalfedgeVec, NONE, VertexId, VertexVec};
 use crate::geometry::mesh::{AttributeKind, CornerAttribute, Mesh, Soup, cross, sub};
+use crate::geometry::morton::along_curve;
 use crate::repair::clean::DraftFace;
 use crate::repair::glue::Gluing;
 use crate::repair::log::{Change, RepairLog};
 use crate::repair::{Component, ComponentError, Repaired};
+
+/// Faces of a component that keep the order of the file. Larger components take it from the Morton curve: neighbours that lie far from each other in memory, as in
+/// files that were subdivided, make every stage half as slow again (200,000 vertices, `benches/README.md`); arrays of smaller ones fit into caches.
+pub(super) const MOST_IN_ANY_ORDER: usize = 1 << 17;
 
 /// Faces with their final corners, and who is joined to whom.
 struct Glued {
@@ -34,6 +39,7 @@ pub fn assemble(
     let glued = turn_over(draft, gluing);
     let (surface_vertex, fan_home) = number_vertices(&glued, soup.positions.len(), &mut changes);
     let mut members: Vec<Vec<u32>> = vec![Vec::new(); glued.components];
+    let (mut local_vertex, mut local_face) = (vec![NONE; fan_home.len()], vec![NONE; draft.len()]);
     for (f, &c) in glued.component.iter().enumerate() {
         members[c as usize].push(f as u32);
     }
@@ -44,30 +50,50 @@ pub fn assemble(
     }
     let mut places = vec![[NONE; 2]; soup.positions.len()];
     let mut components = Vec::with_capacity(members.len());
-    for (c, faces) in members.iter().enumerate() {
+    for (c, faces) in members.iter_mut().enumerate() {
+        let corners_of = |f: u32| (0..3).map(move |k| 3 * f as usize + k);
+        let vertex = |corner: usize| surface_vertex[glued.fan[corner] as usize];
         // Surface vertices ascend in the order of the file, copies last: so do the local ones.
-        let mut vertices: Vec<u32> = faces
-            .iter()
-            .flat_map(|&f| (0..3).map(move |k| 3 * f as usize + k))
-            .map(|corner| surface_vertex[glued.fan[corner] as usize])
+        let mut vertices: Vec<u32> = (faces.iter())
+            .flat_map(|&f| corners_of(f).map(vertex))
             .collect();
         vertices.sort_unstable();
         vertices.dedup();
+        let position = |v: u32| soup.positions[fan_home[v as usize].0 as usize];
+        let corners: Vec<[f64; 3]> = vertices.iter().map(|&v| position(v)).collect();
+        let frame = Frame::of(&corners);
+        drop(corners);
+        if faces.len() > MOST_IN_ANY_ORDER {
+            let centre = |i: usize| {
+                let points =
+                    corners_of(faces[i]).map(|corner| frame.enter(position(vertex(corner))));
+                points.fold([0.0; 3], |sum, p| {
+                    [sum[0] + p[0], sum[1] + p[1], sum[2] + p[2]]
+                })
+            };
+            let (_, order) = along_curve(faces.len(), centre);
+            *faces = order.iter().map(|&i| faces[i as usize]).collect();
+            vertices.clear();
+        }
+        for (local, &v) in vertices.iter().enumerate() {
+            local_vertex[v as usize] = local as u32;
+        }
+        for (local, &f) in faces.iter().enumerate() {
+            local_face[f as usize] = local as u32;
+            for v in corners_of(f).map(vertex) {
+                if local_vertex[v as usize] == NONE {
+                    local_vertex[v as usize] = vertices.len() as u32;
+                    vertices.push(v);
+                }
+            }
+        }
         for (local, &v) in vertices.iter().enumerate() {
             let (source, is_first) = fan_home[v as usize];
             if is_first {
                 places[source as usize] = [c as u32, local as u32];
             }
         }
-        let local = |corner: usize| {
-            let v = surface_vertex[glued.fan[corner] as usize];
-            vertices.partition_point(|&w| w < v) as u32
-        };
-        let corners: Vec<[f64; 3]> = (vertices.iter())
-            .map(|&v| soup.positions[fan_home[v as usize].0 as usize])
-            .collect();
-        let frame = Frame::of(&corners);
-        let positions = corners.iter().map(|&p| frame.enter(p)).collect();
+        let positions = vertices.iter().map(|&v| frame.enter(position(v))).collect();
         let mesh = match contradiction[c] {
             Some([face, neighbour]) => Err(ComponentError::NonOrientable {
                 face,
@@ -84,7 +110,8 @@ pub fn assemble(
                     faces,
                     source,
                     positions,
-                    local,
+                    |corner| local_vertex[vertex(corner) as usize],
+                    |face| local_face[face] as usize,
                     &mut changes,
                 )
             }
@@ -219,15 +246,15 @@ fn build(
     faces: &[u32],
     source_vertex: Vec<u32>,
     positions: VertexVec<[f64; 3]>,
-    local: impl Fn(usize) -> u32,
+    local_vertex: impl Fn(usize) -> u32,
+    local_face: impl Fn(usize) -> usize,
     changes: &mut Vec<Change>,
 ) -> Result<Mesh, ComponentError> {
-    let local_face = |f: usize| faces.partition_point(|&g| (g as usize) < f);
     let mut tail = HalfedgeVec::default();
     let mut twin = Vec::with_capacity(3 * faces.len());
     for &f in faces {
         for h in 3 * f as usize..3 * f as usize + 3 {
-            tail.push(VertexId::new(local(h) as usize));
+            tail.push(VertexId::new(local_vertex(h) as usize));
             let t = glued.twin[h] as usize;
             let joined = glued.twin[h] != NONE;
             twin.push(joined.then(|| HalfedgeId::new(3 * local_face(t / 3) + t % 3)));

@@ -17,8 +17,8 @@
 //!    across edges with exactly two faces, and the minority is flipped.
 //! 4. **assemble** ([`assemble`]): one vertex a fan, one mesh a component, doubled edges split.
 //!
-//! *Guaranteed:* surviving vertices and faces keep the order of the file (copies and new vertices
-//! come last); the surface stays where it is, to a millionth of its faces' length, when nothing is welded with a tolerance; same input, same output.
+//! *Guaranteed:* surviving vertices and faces of components with at most 131,072 faces keep the order of the file (copies and new vertices
+//! come last), larger ones lie along a space-filling curve; the surface stays where it is, to a millionth of its faces' length, when nothing is welded with a tolerance; same input, same output.
 //! *Not guaranteed:* that a closed component encloses a positive volume (the majority of the input's
 //! faces decides which side is out, not the volume), nor freedom from self-intersections.
 
@@ -214,7 +214,7 @@ pub enum ComponentError {
 /// One connected piece of the surface.
 #[derive(Clone, Debug)]
 pub struct Component {
-    /// The surface, with its own compact numbering of vertices and faces in input order.
+    /// The surface, with its own compact numbering of vertices and faces.
     pub mesh: Result<Mesh, ComponentError>,
     /// Number of its faces before doubled edges were split.
     pub faces: usize,

@@ -18,13 +18,12 @@ pub fn trials() -> Vec<Trial> {
     };
     vec![
         trial("closed", || report("genus-3-pretzel.obj", "closed", &[])),
-        trial("boundaries", || {
-            report("three-boundaries-rabbit.ply", "boundaries", &[])
+        trial("hostile_name", || {
+            report("three-boundaries-rabbit.ply", HOSTILE, &[])
         }),
         trial("flat", || {
             report("genus-1-mug.off", "flat", &["images.domain=flat"])
         }),
-        trial("hostile_name", || report("disk-mask.obj", HOSTILE, &[])),
         trial("undrawn", undrawn),
         trial("index", index),
     ]

@@ -2,6 +2,7 @@
 
 use super::{Triangles, corners, normal};
 use crate::geometry::mesh::{cross, distance_to_segment, dot, norm, sub};
+use crate::geometry::morton::along_curve;
 use std::ops::Range;
 
 /// Most triangles in a leaf.
@@ -56,7 +57,7 @@ impl BoxTree {
         if count == 0 || count > u32::MAX as usize / 2 {
             return None;
         }
-        let (codes, order) = along_curve(surface);
+        let (codes, order) = along_curve(count, |face| centre(surface, face));
         let mut division = Division {
             triangles: (order.iter())
                 .map(|&f| corners(surface, surface.faces[f as usize]))
@@ -130,60 +131,10 @@ impl BoxTree {
     }
 }
 
-/// Most bits of a coordinate in a code of the Morton curve.
-const BITS: u32 = 21;
-
-/// The codes of a surface's faces in ascending order, and whose they are.
-fn along_curve(surface: Triangles<'_>) -> (Vec<u64>, Vec<u32>) {
-    // Three times the centres.
-    let centre = |f: &[u32; 3]| -> [f64; 3] {
-        let [a, b, c] = corners(surface, *f);
-        [a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2]]
-    };
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for c in surface.faces.iter().map(centre) {
-        for i in 0..3 {
-            (low[i], high[i]) = (low[i].min(c[i]), high[i].max(c[i]));
-        }
-    }
-    // Code and number of a face in one word, which is quick to sort.
-    let of_number = usize::BITS - surface.faces.len().leading_zeros();
-    let bits = ((u64::BITS - of_number) / 3).min(BITS);
-    let longest = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
-    let cells = ((1_u64 << bits) - 1) as f64 / longest.max(f64::MIN_POSITIVE);
-    let code = |c: [f64; 3]| {
-        // Casts of what is no number are 0.
-        let place = |i: usize| spread(((c[i] - low[i]) * cells) as u64);
-        place(0) << 2 | place(1) << 1 | place(2)
-    };
-    let mut words: Vec<u64> = (0..)
-        .zip(surface.faces)
-        .map(|(number, f): (u64, _)| code(centre(f)) << of_number | number)
-        .collect();
-    words.sort_unstable();
-    let numbers = words
-        .iter()
-        .map(|word| (word & ((1 << of_number) - 1)) as u32);
-    let numbers = numbers.collect();
-    for word in &mut words {
-        *word >>= of_number;
-    }
-    (words, numbers)
-}
-
-/// Two zeros before each of the last [`BITS`] bits.
-fn spread(x: u64) -> u64 {
-    let mut x = x & ((1 << BITS) - 1);
-    for (shift, mask) in [
-        (32, 0x001f_0000_0000_ffff),
-        (16, 0x001f_0000_ff00_00ff),
-        (8, 0x100f_00f0_0f00_f00f),
-        (4, 0x10c3_0c30_c30c_30c3),
-        (2, 0x1249_2492_4924_9249),
-    ] {
-        x = (x | x << shift) & mask;
-    }
-    x
+/// Three times the centre of a triangle.
+fn centre(surface: Triangles<'_>, face: usize) -> [f64; 3] {
+    let [a, b, c] = corners(surface, surface.faces[face]);
+    [a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2]]
 }
 
 /// A tree that is being made.
