@@ -6,6 +6,7 @@ use affine_atlas::flow::cones::{
     self, BoundaryCondition, BoundaryParams, ConeParams, Prescription,
 };
 use affine_atlas::flow::ricci::{self, FlatMetric};
+use affine_atlas::geometry::connectivity::Connectivity;
 use affine_atlas::geometry::ids::{EdgeVec, VertexId};
 use affine_atlas::geometry::mesh::{Mesh, Soup, triangle_area};
 use affine_atlas::geometry::triangle;
@@ -24,7 +25,27 @@ pub fn mesh(triangles: &Triangles) -> Mesh {
     let soup = soup(triangles);
     let mut repaired = repair::repair(&soup, &Default::default()).unwrap();
     assert_eq!(repaired.components.len(), 1, "one component");
-    repaired.components.swap_remove(0).mesh.unwrap()
+    in_order_of_file(repaired.components.swap_remove(0).mesh.unwrap())
+}
+
+/// A mesh without attributes whose vertices and faces are all those of its file, in their order, which repair gives up for large ones.
+fn in_order_of_file(mut mesh: Mesh) -> Mesh {
+    if mesh.source_vertex.iter().is_sorted() {
+        return mesh;
+    }
+    let (old, positions) = (mesh.source_vertex.clone(), mesh.positions.clone());
+    let mut faces = vec![[0; 3]; mesh.source_face.len()];
+    let given = mesh.connectivity.to_faces();
+    for (face, &source) in given.iter().zip(mesh.source_face.iter()) {
+        faces[source as usize] = face.map(|v| old[VertexId::new(v as usize)]);
+    }
+    for (v, &source) in old.enumerate() {
+        mesh.positions[VertexId::new(source as usize)] = positions[v];
+    }
+    mesh.connectivity = Connectivity::from_faces(&faces, positions.len()).unwrap();
+    mesh.source_vertex = (0..positions.len() as u32).collect::<Vec<_>>().into();
+    mesh.source_face = (0..faces.len() as u32).collect();
+    mesh
 }
 
 pub fn soup(triangles: &Triangles) -> Soup {

@@ -39,14 +39,7 @@ pub fn subdivision(file: &Path, condition: BoundaryCondition) -> Result<(), Stri
         if few.len() == many.len() && worst <= 2.0 {
             continue;
         }
-        // Two optima, or a miss? Vertices of the coarse mesh are known in the fine one by their numbers in the file; the other way the nearest is taken.
-        let mut kept = Vec::new();
-        for &(v, k) in &few {
-            let source = coarse.source_vertex.as_slice()[v as usize];
-            let mut sources = fine.source_vertex.iter();
-            let v = sources.position(|&s| s == source).ok_or("no vertex")?;
-            kept.push((v as u32, k));
-        }
+        // Two optima, or a miss? Vertices of the coarse mesh keep their numbers in the fine one; the other way the nearest is taken.
         let nearest = |at: [f64; 3]| {
             let far = |v: &usize| distance(at, coarse.positions.as_slice()[*v]);
             let vertices = 0..coarse.positions.len();
@@ -58,7 +51,7 @@ pub fn subdivision(file: &Path, condition: BoundaryCondition) -> Result<(), Stri
             moved.push((v as u32, *k));
         }
         let mut worth = Vec::new();
-        for (mesh, own, other) in [(&coarse, &few, &moved), (&fine, &many, &kept)] {
+        for (mesh, own, other) in [(&coarse, &few, &moved), (&fine, &many, &few)] {
             let of = |cones: &[Chosen]| {
                 let given = models::prescribe(mesh, cones, condition)?;
                 Ok::<_, String>(models::distortion(mesh, &given)?.cost.sqrt())
