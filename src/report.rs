@@ -3,8 +3,10 @@
 //! *Enters:* mesh, flat lengths, cut, charts. *Leaves:* [`Quality`]: distortion (9), log scale, angle error, cut
 //! length, and the residuals of what makes the atlas affine: transitions, holonomy, cocycle.
 
+mod blocks;
 mod images;
 
+pub use blocks::SurfaceImages;
 pub use images::measure_images;
 
 use crate::atlas::charts::{Chart, ChartKind, Charts, Transition};

@@ -29,7 +29,8 @@ use crate::geometry::mesh::{
     AttributeKind, CornerAttribute, Mesh, bounding_box, cross, distance, norm, sub,
 };
 use crate::parallel;
-use interpolation::{in_texels, mix, unit};
+use interpolation::unit;
+pub(crate) use interpolation::{in_texels, mix};
 
 /// A model farther from the origin than this many diagonals of its bounding box gets an image origin.
 const FAR_DIAGONALS: f64 = 10.0;

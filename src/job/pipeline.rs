@@ -11,9 +11,8 @@ use crate::geometry::deviation::Triangles;
 use crate::grid::{self, Spacing};
 use crate::observe::{Observer, part};
 use crate::product::AffineAtlas;
-use crate::rebuild::Images;
 use crate::repair::Component;
-use crate::report;
+use crate::report::{self, SurfaceImages};
 
 /// The pipeline. `enter` is told each stage's name before it begins, and may stop the job; `spacing` is that of vertices that a coarse mesh gets for a grid,
 /// `no_grid` says why there is none where one was wanted.
@@ -85,20 +84,21 @@ pub(super) fn pipeline(
         faces: &given_faces,
     };
     let _part = part!("image error");
-    let readable = Images::new(&patches, &images, origin);
-    let (quality, distances) = report::measure_images(
+    let surface_images = SurfaceImages {
+        mesh: &mesh,
+        layout: &patches,
+        images: &images,
+        origin,
+    };
+    let (quality, image_distance) = report::measure_images(
         quality,
         given,
-        &readable,
+        &surface_images,
         topology,
         config.patches.texel_budget,
         // What only the page shows.
-        match config.report.enabled {
-            true => mesh.positions.as_slice(),
-            false => &[],
-        },
+        config.report.enabled,
     );
-    let image_distance = distances.filter(|_| config.report.enabled);
     let atlas = AffineAtlas {
         topology,
         seamless: report::is_seamless(&charts),

@@ -6,7 +6,7 @@ use crate::geometry::mesh::norm;
 
 /// A point of a patch in texels, such that texels are sampled at halves. The sides of a block come to lie on the first and the
 /// last column and row to the last bit.
-pub(super) fn in_texels(patch: &Patch, p: [f64; 2]) -> [f64; 2] {
+pub(crate) fn in_texels(patch: &Patch, p: [f64; 2]) -> [f64; 2] {
     match patch.domain {
         Domain::Flat => to_texel(&patch.texel_to_patch, p),
         Domain::Grid => {
@@ -17,7 +17,7 @@ pub(super) fn in_texels(patch: &Patch, p: [f64; 2]) -> [f64; 2] {
 }
 
 /// The mean of the corners' values by weights.
-pub(super) fn mix<const N: usize>(values: &[[f64; N]; 3], weights: [f64; 3]) -> [f64; N] {
+pub(crate) fn mix<const N: usize>(values: &[[f64; N]; 3], weights: [f64; 3]) -> [f64; N] {
     std::array::from_fn(|i| (0..3).map(|k| weights[k] * values[k][i]).sum())
 }
 

@@ -262,7 +262,7 @@ fn squared_to_box(p: [f64; 3], node: &Node) -> f64 {
 /// ```
 ///
 /// A triangle without area is a segment or a point.
-pub(super) fn squared_distance(p: [f64; 3], t: [[f64; 3]; 3]) -> f64 {
+pub(crate) fn squared_distance(p: [f64; 3], t: [[f64; 3]; 3]) -> f64 {
     let squared = squared_distance_by_region(p, t);
     if squared.is_finite() {
         return squared;

@@ -14,14 +14,14 @@
 //! Santa-Cruz, Ebrahimi, *MESH* (2002) measure in the same way.
 
 mod boxes;
+mod samples;
 
-use crate::geometry::mesh::{cross, norm, sub, triangle_area};
-use crate::parallel;
+use crate::geometry::mesh::{cross, norm, sub};
 use boxes::BoxTree;
+pub(crate) use boxes::squared_distance;
 use rayon::prelude::*;
-
-/// Samples that are worked on in one go: neighbours on the surface, so that each search starts where the last one ended.
-const RUN: usize = 512;
+use samples::RUN;
+pub(crate) use samples::{EvenSamples, OneSided, evenly};
 
 /// Triangles in space. Indices must be in range.
 #[derive(Clone, Copy, Debug)]
@@ -61,15 +61,6 @@ pub struct Sampling {
     pub vertices: usize,
 }
 
-/// Sums over the samples of one surface.
-#[derive(Clone, Copy, Debug, Default)]
-struct OneSided {
-    squares: f64,
-    farthest: f64,
-    angles: f64,
-    largest_angle: f64,
-}
-
 /// Measures two surfaces against each other; `None` where one has no area.
 pub fn deviation(a: Triangles<'_>, b: Triangles<'_>, sampling: Sampling) -> Option<Deviation> {
     deviation_and_distances(a, b, sampling, &[]).map(|found| found.0)
@@ -84,41 +75,24 @@ pub fn deviation_and_distances(
 ) -> Option<(Deviation, Vec<f64>)> {
     let (tree_a, tree_b) = rayon::join(|| BoxTree::new(a), || BoxTree::new(b));
     let tree_b = tree_b?;
-    let (area_a, from_a) = one_sided(a, &tree_b, sampling)?;
-    let (area_b, from_b) = one_sided(b, &tree_a?, sampling)?;
-    let n = sampling.samples.max(1) as f64;
-    let mean = |x: f64, y: f64| (area_a * x / n + area_b * y / n) / (area_a + area_b);
-    let found = Deviation {
-        rms: mean(from_a.squares, from_b.squares).sqrt(),
-        hausdorff: from_a.farthest.max(from_b.farthest),
-        mean_normal_angle: mean(from_a.angles, from_b.angles),
-        max_normal_angle: from_a.largest_angle.max(from_b.largest_angle),
-    };
-    Some((found, from_tree(points, &tree_b)))
+    let from_a = one_sided(a, &tree_b, sampling)?;
+    let from_b = one_sided(b, &tree_a?, sampling)?;
+    let distances = from_tree(points, &tree_b);
+    Some((
+        from_a.together(from_b),
+        distances.into_iter().map(|found| found.distance).collect(),
+    ))
 }
 
-/// Area of a surface, and its samples against another.
-fn one_sided(
-    surface: Triangles<'_>,
-    other: &BoxTree,
-    sampling: Sampling,
-) -> Option<(f64, OneSided)> {
-    let mut total = 0.0;
-    let up_to: Vec<f64> = surface
-        .faces
-        .iter()
-        .map(|&f| {
-            total += triangle_area(corners(surface, f));
-            total
-        })
-        .collect();
-    if !(total > 0.0 && total.is_finite()) {
-        return None;
-    }
-    let samples = sampling.samples.max(1);
-    let runs = parallel::map_numbers(samples.div_ceil(RUN), |run| {
-        let range = run * RUN..samples.min((run + 1) * RUN);
-        sample_run(surface, other, &up_to, range, samples)
+/// The samples of a surface against another.
+fn one_sided(surface: Triangles<'_>, other: &BoxTree, sampling: Sampling) -> Option<OneSided> {
+    let samples = EvenSamples::new(surface, sampling.samples)?;
+    let mut sum = samples.sum(|sum, near, face, weights| {
+        let triangle = corners(surface, surface.faces[face]);
+        let nearest = other.nearest(point_in(triangle, weights), *near);
+        *near = nearest.face;
+        let angle = angle(normal(triangle), other.normal(nearest.face));
+        sum.add(samples.area(), nearest.distance, angle);
     });
     let step = surface
         .positions
@@ -129,31 +103,35 @@ fn one_sided(
         0 => Vec::new(),
         _ => surface.positions.iter().copied().step_by(step).collect(),
     };
-    let mut sum = OneSided {
-        farthest: from_tree(&tested, other).into_iter().fold(0.0, f64::max),
-        ..OneSided::default()
-    };
-    for run in runs {
-        sum.squares += run.squares;
-        sum.angles += run.angles;
-        sum.farthest = sum.farthest.max(run.farthest);
-        sum.largest_angle = sum.largest_angle.max(run.largest_angle);
+    for found in from_tree(&tested, other) {
+        sum.reach(found.distance);
     }
-    Some((total, sum))
+    Some(sum)
 }
 
-/// Distance of each point from a surface; `None` where that has no faces. Quick where points that follow each other are near each other.
-pub fn distances(points: &[[f64; 3]], surface: Triangles<'_>) -> Option<Vec<f64>> {
+/// The nearest point of a surface to another point.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Near {
+    pub distance: f64,
+    /// Normal of its face, of any length.
+    pub normal: [f64; 3],
+}
+
+/// What of a surface is nearest to each point; `None` where it has no faces. Quick where points that follow each other are near each other.
+pub(crate) fn nearest(points: &[[f64; 3]], surface: Triangles<'_>) -> Option<Vec<Near>> {
     Some(from_tree(points, &BoxTree::new(surface)?))
 }
 
-fn from_tree(points: &[[f64; 3]], tree: &BoxTree) -> Vec<f64> {
+fn from_tree(points: &[[f64; 3]], tree: &BoxTree) -> Vec<Near> {
     let runs = points.par_chunks(RUN).flat_map_iter(|run| {
         let mut near = 0;
         run.iter().map(move |&p| {
             let nearest = tree.nearest(p, near);
             near = nearest.face;
-            nearest.distance
+            Near {
+                distance: nearest.distance,
+                normal: tree.normal(nearest.face),
+            }
         })
     });
     runs.collect()
@@ -163,47 +141,13 @@ fn corners(surface: Triangles<'_>, face: [u32; 3]) -> [[f64; 3]; 3] {
     face.map(|v| surface.positions[v as usize])
 }
 
-fn sample_run(
-    surface: Triangles<'_>,
-    other: &BoxTree,
-    up_to: &[f64],
-    range: std::ops::Range<usize>,
-    samples: usize,
-) -> OneSided {
-    let total = up_to.last().copied().unwrap_or(0.0);
-    let place = |i: usize| (i as f64 + 0.5) / samples as f64 * total;
-    let mut face = up_to.partition_point(|&x| x < place(range.start));
-    let mut near = 0;
-    let mut sum = OneSided::default();
-    for i in range {
-        while face + 1 < up_to.len() && up_to[face] < place(i) {
-            face += 1;
-        }
-        let triangle = corners(surface, surface.faces[face.min(up_to.len() - 1)]);
-        let nearest = other.nearest(point_in(triangle, i), near);
-        near = nearest.face;
-        let angle = angle(normal(triangle), other.normal(nearest.face));
-        sum.squares += nearest.distance * nearest.distance;
-        sum.farthest = sum.farthest.max(nearest.distance);
-        sum.angles += angle;
-        sum.largest_angle = sum.largest_angle.max(angle);
-    }
-    sum
-}
-
-/// The point that belongs to a number: over many numbers evenly spread over a triangle (the sequence R₂ of Roberts, 2018, on the
-/// square, which the map to the triangle keeps even).
-fn point_in(t: [[f64; 3]; 3], i: usize) -> [f64; 3] {
-    /// Powers of the root of x³ = x + 1, inverted.
-    const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
-    let [r, s] = STEPS.map(|step| (0.5 + i as f64 * step).fract());
-    let r = r.sqrt();
-    let weights = [1.0 - r, r * (1.0 - s), r * s];
+/// The point of a triangle with these weights.
+pub(crate) fn point_in(t: [[f64; 3]; 3], weights: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|x| (0..3).map(|k| weights[k] * t[k][x]).sum())
 }
 
 /// Normal of a triangle, of any length.
-fn normal(t: [[f64; 3]; 3]) -> [f64; 3] {
+pub(crate) fn normal(t: [[f64; 3]; 3]) -> [f64; 3] {
     cross(sub(t[1], t[0]), sub(t[2], t[0]))
 }
 
