@@ -182,7 +182,8 @@ impl AssetOutcome {
             && (self.components.is_empty() || self.components.iter().any(|c| c.result.is_ok()));
         if !new {
             self.files = list_files(&output.join(&self.id)).unwrap_or_default();
-            self.kept = !self.files.is_empty();
+            // A folder of something else is not replaced, but nor is it a result.
+            self.kept = self.files.iter().any(|file| file.ends_with("atlas.json"));
         }
     }
 

@@ -307,12 +307,18 @@ impl Process {
                 )),
                 // How many bytes more it asked for depends on threads and on what else the heap holds: records are to be the same on every machine.
                 Some(share) if self.is_share => no_memory(format!(
-                    "needed more than the {share} bytes that are its share of the memory that was free ({during}): let fewer run at a time (run.jobs), set run.memory, lower patches.texel_budget, or decimate the mesh"
+                    "needed more than the {share} bytes that are its share of the memory that was free ({during}): let fewer run at a time (run.jobs), set run.memory, ask for fewer cells (grid.cells) or texels (patches.texel_budget), or decimate the mesh"
                 )),
                 Some(cap) => no_memory(format!(
-                    "needed more than the {cap} bytes of run.memory ({during}): raise run.memory, lower patches.texel_budget, or decimate the mesh"
+                    "needed more than the {cap} bytes of run.memory ({during}): raise run.memory, ask for fewer cells (grid.cells) or texels (patches.texel_budget), or decimate the mesh"
                 )),
             };
+        }
+        // One that did not get as far as to take its job: there was no memory for its first thread, or for the program.
+        if let (Some(cap), Some(2 | 127)) = (self.memory, status.and_then(|status| status.code())) {
+            return no_memory(format!(
+                "could not begin within the {cap} bytes of run.memory: raise run.memory"
+            ));
         }
         if signal == Some(9) && ended_for_memory {
             return no_memory(format!(

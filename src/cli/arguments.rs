@@ -400,7 +400,7 @@ pub struct Fit {
     /// Mesh, or folder that `build` wrote for one
     #[arg(value_name = "MESH")]
     pub input: PathBuf,
-    /// Folder to write, replacing an older one [default: MESH.fit without the mesh's extension]
+    /// Folder to write, replacing an older one [default: NAME.fit here for NAME.obj, beside it for a folder]
     #[arg(short, long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
     /// Cells of the control mesh, about; each is a bicubic piece [default: 2000]
@@ -413,9 +413,9 @@ pub struct Fit {
     /// How far normals of STEP faces may differ beside irregular points, degrees; less takes more control points
     #[arg(long, value_name = "DEGREES", default_value_t = DEFAULT_ANGLE, value_parser = angle)]
     pub angle: f64,
-    /// Unit of the mesh's coordinates: mm, cm, m or in
-    #[arg(long, value_name = "UNIT", default_value = "mm", value_parser = unit)]
-    pub unit: LengthUnit,
+    /// Unit of the mesh's coordinates: mm, cm, m or in [default: m for glTF, which is in metres, else mm]
+    #[arg(long, value_name = "UNIT", value_parser = unit)]
+    pub unit: Option<LengthUnit>,
     /// Write JSON instead of text
     #[arg(long)]
     pub json: bool,

@@ -8,8 +8,10 @@ use super::progress::Progress;
 use super::work::{FitRequest, Work};
 use super::{exit, interrupt, panics, terminal};
 use affine_atlas::config::Config;
+use affine_atlas::export::step::LengthUnit;
 use affine_atlas::job::fit::{FitParams, Size, Unfitted};
 use affine_atlas::outcome::{Failure, FailureKind};
+use affine_atlas::read::atlas::source;
 use std::path::{Path, PathBuf};
 
 /// Fits one asset. Exit code 1 where a component of it has no surface.
@@ -34,10 +36,11 @@ pub fn run(fit: &Fit, global: &Global, work: &Work) -> Result<u8, Problem> {
     start_threads(global.threads, &Config::default())?;
     let announce = !global.quiet && global.log_format == LogFormat::Text;
     interrupt::install(work.remove_staging, announce);
+    let unit = fit.unit.unwrap_or_else(|| unit_of(&fit.input));
     let size = match (fit.cells, fit.tolerance) {
         (Some(cells), _) => Size::Cells(cells as usize),
         (None, Some(Tolerance::OfDiagonal(part))) => Size::OfDiagonal(part),
-        (None, Some(Tolerance::Metres(length))) => Size::Length(length / fit.unit.metres()),
+        (None, Some(Tolerance::Metres(length))) => Size::Length(length / unit.metres()),
         (None, None) => Size::Default,
     };
     let request = FitRequest {
@@ -47,7 +50,7 @@ pub fn run(fit: &Fit, global: &Global, work: &Work) -> Result<u8, Problem> {
         params: FitParams {
             size,
             angle: fit.angle.to_radians(),
-            unit: fit.unit,
+            unit,
         },
     };
     let progress = Progress::new(global, 1);
@@ -85,6 +88,22 @@ pub fn run(fit: &Fit, global: &Global, work: &Work) -> Result<u8, Problem> {
                 _ => exit::SOME_FAILED,
             })
         }
+    }
+}
+
+/// Metres for glTF, whose unit they are, and for what was built from it; else millimetres, as CAD programs take them.
+fn unit_of(input: &Path) -> LengthUnit {
+    let source = match input.is_dir() {
+        true => source(input).map(|source| PathBuf::from(source.path)),
+        false => Some(input.to_owned()),
+    };
+    let extension = source.and_then(|path| Some(path.extension()?.to_ascii_lowercase()));
+    match extension
+        .as_deref()
+        .and_then(|extension| extension.to_str())
+    {
+        Some("glb" | "gltf") => LengthUnit::Metre,
+        _ => LengthUnit::Millimetre,
     }
 }
 

@@ -54,7 +54,10 @@ pub enum Problem {
     NotGlb { path: PathBuf },
     #[error("{} does not end in the name of a folder to write", path.display())]
     NoName { path: PathBuf },
-    #[error("there is no folder {}", path.display())]
+    #[error("{}", match path.exists() {
+        true => format!("{} is no folder; give one that `build` wrote", path.display()),
+        false => format!("there is no folder {}", path.display()),
+    })]
     NoFolder { path: PathBuf },
     #[error("the {given} threads of this run cannot be started: {reason}")]
     Threads { given: usize, reason: String },

@@ -1,7 +1,7 @@
 //! From a component to its charted surface: what atlases of one mesh with different grids have in common.
 
 use super::BuildError;
-use super::flatten::{Flattened, flatten, prescribed};
+use super::flatten::{Flattened, flatten, prepared, prescribed};
 use crate::atlas::charted::Charted;
 use crate::atlas::develop::{Development, Unfolded};
 use crate::atlas::geometry_image::SourceSurface;
@@ -54,14 +54,7 @@ pub(super) fn chart(
     let mesh: Mesh = component.mesh?;
     let (given, given_faces) = (mesh.positions.clone(), mesh.connectivity.to_faces());
     let source = SourceSurface::of(&mesh, &config.images);
-    if config.domain() == Domain::Grid {
-        grid::check_inside(&mesh)?;
-    }
-    let mesh = match config.domain() {
-        // Features that were named are edges of the mesh as it is.
-        Domain::Grid if requests.features.is_empty() => grid::refined(mesh, spacing),
-        _ => mesh,
-    };
+    let mesh = prepared(mesh, requests, config, spacing)?;
     let before = mesh.positions.len();
     let prescription = prescribed(&mesh, requests, config)?;
     let Flattened {

@@ -214,6 +214,9 @@ pub(super) fn each<T: Send>(
 ) -> Result<(), BuildError> {
     observer.stage("repair", 0, 1);
     let repaired = repair::repair(soup, &config.repair)?;
+    if !repaired.log.is_empty() {
+        tracing::info!("repair: {}", repaired.log.summary());
+    }
     let config = config.clone().resolved()?;
     let config = &Config {
         images: config.images.held_by(soup),

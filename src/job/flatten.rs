@@ -16,7 +16,7 @@ use crate::flow::refine::{self, RefineError};
 use crate::flow::ricci::{self, FlatMetric, FlowError, Holonomy};
 use crate::geometry::ids::EdgeVec;
 use crate::geometry::mesh::Mesh;
-use crate::grid;
+use crate::grid::{self, GridError, Spacing};
 use crate::observe::Observer;
 
 /// A slit surface with a flat metric, before it is developed.
@@ -50,6 +50,33 @@ pub(super) fn prescribed(
         &config.boundary,
         &config.features,
     )
+}
+
+/// The mesh that cones and flow work on: for a grid with the vertices that it may want cones at, so far apart.
+pub(super) fn prepared(
+    mesh: Mesh,
+    requests: &Requests,
+    config: &Config,
+    spacing: Spacing,
+) -> Result<Mesh, GridError> {
+    if config.domain() != Domain::Grid {
+        return Ok(mesh);
+    }
+    grid::check_inside(&mesh)?;
+    // Features that were named are edges of the mesh as it is.
+    Ok(match requests.features.is_empty() {
+        true => grid::refined(mesh, spacing),
+        false => mesh,
+    })
+}
+
+/// The same as a build tries it first.
+pub(super) fn prepared_at_first(
+    mesh: Mesh,
+    requests: &Requests,
+    config: &Config,
+) -> Result<Mesh, GridError> {
+    prepared(mesh, requests, config, grid::spacings(config.grid.cells)[0])
 }
 
 /// Repairs connectivity, flows, refines and cuts. `enter` is told each stage's name before it begins, and may stop the job.

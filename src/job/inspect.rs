@@ -2,9 +2,9 @@
 
 mod existence;
 
-use super::flatten::prescribed;
+use super::flatten::{prepared_at_first, prescribed};
 use super::listing::{self, counted};
-use super::{BuildError, refine_for};
+use super::{BuildError, refine_for, shares};
 use crate::atlas::patch::Domain;
 use crate::config::Config;
 use crate::export::ExportError;
@@ -71,8 +71,11 @@ pub fn inspect(path: &Path, config: &Config) -> Result<Inspection, BuildError> {
         line(format!("note: {note}"));
     }
     let (mut failures, mut regions) = (Vec::new(), Vec::new());
-    let parts = repaired.components.into_iter().zip(requests).zip(of_flat);
-    for (i, ((component, requests), of_flat)) in parts.enumerate() {
+    let shares = shares::shares(&repaired.components);
+    let parts = repaired.components.into_iter().zip(shares);
+    let parts = parts.zip(requests.into_iter().zip(of_flat));
+    for (i, ((component, share), (requests, of_flat))) in parts.enumerate() {
+        let config = &shares::of_share(config, share)?;
         if count > 1 {
             line(format!("component {i}:"));
         }
@@ -118,7 +121,7 @@ fn plan(
     line: &mut impl FnMut(String),
     offend: &mut impl FnMut(RegionOf),
 ) -> Result<(), BuildError> {
-    let mesh = component.mesh?;
+    let mesh = prepared_at_first(component.mesh?, requests, config)?;
     let prescription = prescribed(&mesh, requests, config)?;
     let given = existence::decide(&mesh, &prescription, &config.flow)
         .map_err(|e| BuildError::flow(e, &mesh))?;

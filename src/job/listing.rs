@@ -1,6 +1,7 @@
 //! The cones of a prescription in words, a line a group.
 
 use crate::flow::cones::{Prescription, in_pi};
+use crate::geometry::ids::NONE;
 use crate::geometry::mesh::Mesh;
 use std::f64::consts::PI;
 
@@ -18,6 +19,7 @@ pub(super) fn counted(count: usize, one: &str, several: &str) -> String {
 struct Group {
     inside: bool,
     curvature: String,
+    /// Their numbers in the file, [`NONE`] for one that it does not have.
     vertices: Vec<u32>,
 }
 
@@ -79,24 +81,49 @@ fn of_one_curvature(group: &Group) -> String {
         true => counted(group.vertices.len(), "cone", "cones"),
         false => counted(group.vertices.len(), "boundary vertex", "boundary vertices"),
     };
-    let names: Vec<String> = group.vertices.iter().map(u32::to_string).collect();
-    let noun = match names.len() {
-        1 => "vertex",
-        _ => "vertices",
+    let known = group.vertices.iter().filter(|&&v| v != NONE);
+    let names: Vec<String> = known.map(u32::to_string).collect();
+    let of_file = match names.len() {
+        0 => None,
+        1 => Some(format!("vertex {}", few(&names))),
+        _ => Some(format!("vertices {}", few(&names))),
     };
-    format!("{count} of {}: at {noun} {}", group.curvature, few(&names))
+    let added = match group.vertices.len() - names.len() {
+        0 => None,
+        1 => Some("a new vertex".to_owned()),
+        several => Some(format!("{several} new vertices")),
+    };
+    let places: Vec<String> = of_file.into_iter().chain(added).collect();
+    format!(
+        "{count} of {}: at {}",
+        group.curvature,
+        places.join(" and ")
+    )
 }
 
 /// `8 cones: 0.512π at vertex 17, -0.25π at 203 and 0.3π at 9 of the file`.
 fn of_own_curvature(singles: &[&Group]) -> String {
-    let names: Vec<String> = (singles.iter().enumerate())
+    let is_added = |group: &&Group| group.vertices.first() == Some(&NONE);
+    let (added, known): (Vec<&Group>, Vec<&Group>) = singles.iter().copied().partition(is_added);
+    let names: Vec<String> = (known.iter().enumerate())
         .flat_map(|(i, group)| group.vertices.iter().map(move |v| (i, group, v)))
         .map(|(i, group, vertex)| match i {
             0 => format!("{} at vertex {vertex}", group.curvature),
             _ => format!("{} at {vertex}", group.curvature),
         })
         .collect();
-    format!("{} cones: {}", singles.len(), few(&names))
+    let of_file = (!names.is_empty()).then(|| few(&names));
+    let curvatures: Vec<&str> = (added.iter().take(LISTED))
+        .map(|group| group.curvature.as_str())
+        .collect();
+    let more = match added.len().saturating_sub(LISTED) {
+        0 => String::new(),
+        more => format!(" …, {more} more"),
+    };
+    let added = (!curvatures.is_empty())
+        .then(|| format!("{}{more} at new vertices", curvatures.join(", ")));
+    let places: Vec<String> = of_file.into_iter().chain(added).collect();
+    format!("{} cones: {}", singles.len(), places.join("; "))
 }
 
 /// The first names, and how many more there are.
@@ -138,6 +165,36 @@ mod tests {
         }
         let prescription = Prescription::new(target, BoundaryCondition::Uniform);
         cones(&square(), &prescription)
+    }
+
+    #[test]
+    fn vertices_that_the_file_does_not_have_have_no_number() {
+        let mut mesh = square();
+        for v in [7, 8, 13] {
+            mesh.source_vertex[VertexId::new(v)] = NONE;
+        }
+        let lines = |given: &[(usize, f64)]| {
+            let mut target = VertexVec::filled(0.0, 25);
+            for &(v, multiple) in given {
+                target[VertexId::new(v)] = multiple * PI;
+            }
+            cones(
+                &mesh,
+                &Prescription::new(target, BoundaryCondition::Uniform),
+            )
+        };
+        assert_eq!(
+            lines(&[(6, 0.5), (7, 0.5), (8, 0.5), (12, 0.25), (13, -0.25)]),
+            [
+                "3 cones of 0.5π: at vertex 6 of the file and 2 new vertices",
+                "1 cone of 0.25π: at vertex 12 of the file",
+                "1 cone of -0.25π: at a new vertex"
+            ]
+        );
+        assert_eq!(
+            lines(&[(6, 0.5), (7, 0.4), (8, 0.3)]),
+            ["3 cones: 0.5π at vertex 6 of the file; 0.4π, 0.3π at new vertices"]
+        );
     }
 
     #[test]

@@ -94,6 +94,12 @@ pub fn run(
     outcome
 }
 
+/// The mesh that a folder was built from, where that is another one.
+fn older_source(folder: &Path, given: &str, blake3: &str) -> Option<String> {
+    let source = crate::read::atlas::source(folder)?;
+    (source.path != given && source.blake3 != blake3).then_some(source.path)
+}
+
 fn run_stages(
     path: &Path,
     given: &str,
@@ -105,7 +111,17 @@ fn run_stages(
     observer.stage("read", 0, 1);
     let asset = read::read(path, &config.limits)?;
     outcome.input_hash = Some(asset.blake3.clone());
+    for note in &asset.notes {
+        tracing::warn!(asset = outcome.id, "{given}: {note}");
+    }
     outcome.notes.clone_from(&asset.notes);
+    if let Some(older) = older_source(&output.join(&outcome.id), given, &asset.blake3) {
+        tracing::warn!(
+            asset = outcome.id,
+            "{given} takes the place of {older} in {}: they have the same name; give one another output folder",
+            output.join(&outcome.id).display()
+        );
+    }
     for channel in config.images.lacking(&asset.soup) {
         let note = format!(
             "{given} has nothing for the channel \"{}\" of images.channels: its images are written without",

@@ -9,8 +9,13 @@ pub(super) fn warnings(atlas: &AffineAtlas, config: &Config) -> Vec<String> {
     let (quality, most) = (&atlas.quality, config.report.distortion_warning);
     if quality.log_scale.std > most {
         notes.push(format!(
-            "is drawn unevenly: the log scale deviates by {:.2} (report.distortion_warning = {most}), area distortion (9) is {:.2}; more cones help (`affine-atlas cones` shows how much), `affine-atlas explain` shows where",
-            quality.log_scale.std, quality.area_distortion
+            "is drawn unevenly: the log scale deviates by {:.2} (report.distortion_warning = {most}), area distortion (9) is {:.2}; {}; `affine-atlas explain` shows where",
+            quality.log_scale.std,
+            quality.area_distortion,
+            match atlas.grid {
+                Some(_) => "images.domain = \"flat\" follows no sharp edges and borders, and is drawn more evenly",
+                None => "more cones help (`affine-atlas cones` shows how much)",
+            }
         ));
     }
     if let Some(met) = &atlas.metric.quarter_turns

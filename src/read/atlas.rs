@@ -198,6 +198,27 @@ struct Patch {
     texel_to_patch: [[f64; 3]; 2],
 }
 
+/// What an atlas was built from, as `atlas.json` says.
+#[derive(Clone, Debug, Deserialize, PartialEq, Eq)]
+pub struct Source {
+    /// The file, as it was given.
+    pub path: String,
+    /// BLAKE3 hash of its bytes, hexadecimal.
+    pub blake3: String,
+}
+
+/// What the asset in a folder was built from; `None` where there is no atlas.
+pub fn source(folder: &Path) -> Option<Source> {
+    #[derive(Deserialize)]
+    struct Document {
+        source: Source,
+    }
+    let first = component_folders(folder).ok()?.into_iter().next()?;
+    let text = read_bounded(&first.join("atlas.json"), JSON_LIMIT).ok()?;
+    let document: Document = serde_json::from_slice(&text).ok()?;
+    Some(document.source)
+}
+
 /// The folders of the components of an asset, in order: the asset's own where it has one component.
 ///
 /// # Errors

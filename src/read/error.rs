@@ -83,7 +83,9 @@ pub enum ReadProblem {
     #[error("is not a regular file; name a mesh file")]
     NotAFile,
     /// The name has no extension.
-    #[error("has no file name extension; rename it to one of .gltf, .glb, .obj, .ply, .stl, .off")]
+    #[error(
+        "has no file name extension; give a mesh whose name ends in one of .gltf, .glb, .obj, .ply, .stl, .off"
+    )]
     NoExtension,
     /// The name's extension is none of ours.
     #[error(

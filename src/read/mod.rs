@@ -129,6 +129,8 @@ pub fn read(path: &Path, params: &ReadParams) -> Result<SourceAsset, ReadError> 
         if path.is_dir() {
             return Err(ReadProblem::NotAFile);
         }
+        // A name that is no file's says nothing of a format.
+        std::fs::metadata(path).map_err(|source| ReadProblem::Io { source })?;
         let format = format_of(path)?;
         let mut build = SoupBuilder::new(params);
         let (folder, bytes) = Folder::open(path, &mut build.budget)?;

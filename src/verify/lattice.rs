@@ -8,11 +8,14 @@ use super::arrays::Arrays;
 use super::document::{Document, Irregular};
 use super::formulas::{Point2, Worst, doubled_area2};
 use super::surface::Surface;
+use crate::read::bounded::read_bounded;
 use crate::read::npz::Npz;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
+/// Largest quad mesh that is read (bytes): 2,000,000 cells have 200 MB.
+const OBJ_LIMIT: u64 = u32::MAX as u64;
 /// By how much of a cell transitions may be off.
 const TRANSITION_TOLERANCE: f64 = 1e-9;
 /// By how much of itself the sum of areas may be off.
@@ -24,9 +27,56 @@ struct Grid {
     turns: Vec<u8>,
     shift: Vec<[i64; 2]>,
     points: usize,
+    positions: Vec<[f64; 3]>,
     quads: Vec<[u32; 4]>,
     patch: Vec<u32>,
     cell: Vec<[u32; 2]>,
+}
+
+/// `quads.obj` holds the arrays `quad_positions` and `quads`, row by row.
+fn quad_file(folder: &Path, grid: &Grid, document: &Document, verdicts: &mut Verdicts) {
+    let path = folder.join("quads.obj");
+    if !path.exists() && !document.is_generated() {
+        return;
+    }
+    let found = match read_bounded(&path, OBJ_LIMIT) {
+        Ok(bytes) => difference(&String::from_utf8_lossy(&bytes), grid),
+        Err(error) => Some(error.to_string()),
+    };
+    verdicts.note(
+        "quads.obj holds the quad mesh",
+        found.is_none(),
+        found.unwrap_or_else(|| format!("{} quads", grid.quads.len())),
+    );
+}
+
+/// The first line of an OBJ file that is not as the arrays have it.
+fn difference(text: &str, grid: &Grid) -> Option<String> {
+    let (mut points, mut quads) = (0, 0);
+    for (line, number) in text.lines().zip(1..) {
+        let mut words = line.split_ascii_whitespace();
+        let own = match words.next() {
+            Some("v") => {
+                let point = grid.positions.get(points);
+                points += 1;
+                point.is_some_and(|p| words.map(str::parse).eq(p.iter().map(|&x: &f64| Ok(x))))
+            }
+            Some("f") => {
+                let quad = grid.quads.get(quads);
+                quads += 1;
+                let corner = |word: &str| word.split('/').next().unwrap_or_default().parse::<u32>();
+                quad.is_some_and(|q| words.map(corner).eq(q.iter().map(|&v| Ok(v + 1))))
+            }
+            _ => true,
+        };
+        if !own {
+            let line: String = line.chars().take(80).collect();
+            return Some(format!("line {number}, `{line}`, is not that of atlas.npz"));
+        }
+    }
+    let (all, cells) = (grid.positions.len(), grid.quads.len());
+    (points != all || quads != cells)
+        .then(|| format!("{points} vertices and {quads} faces in place of {all} and {cells}"))
 }
 
 fn read(folder: &Path, faces: usize) -> Result<Grid, String> {
@@ -51,6 +101,7 @@ fn read(folder: &Path, faces: usize) -> Result<Grid, String> {
         turns,
         shift: shift.as_chunks::<2>().0.to_vec(),
         points,
+        positions: positions.as_chunks::<3>().0.to_vec(),
         quads,
         patch,
         cell,
@@ -91,6 +142,7 @@ pub(super) fn check(
         (sum - cells).abs() <= AREA_TOLERANCE * cells && stated.cells == grid.quads.len(),
         format!("{sum} of {}", stated.cells),
     );
+    quad_file(folder, &grid, document, verdicts);
     let worst = transitions(&grid, surface);
     verdicts.note(
         "transitions of the grid are quarter turns and whole numbers",

@@ -155,6 +155,58 @@ fn verify_compares_sides() {
     assert!(said.contains(name), "{said}");
 }
 
+/// The quad mesh as a file is that of the arrays: one that lacks a line, or has another number, is found, and so is none.
+#[test]
+fn verify_compares_the_quad_mesh() {
+    let built = build(Path::new("fixtures/good/genus-0-cube.obj"), &[]);
+    let atlas = built.atlas();
+    let path = atlas.join("quads.obj");
+    let text = std::fs::read_to_string(&path).expect("there");
+    let (all_but_last, last) = text.trim_end().rsplit_once('\n').expect("lines");
+    let corners: Vec<&str> = last.split(' ').collect();
+    let turned = [0, 2, 3, 4, 1].map(|k| corners[k]).join(" ");
+    for damaged in [
+        Some(text.replacen("v ", "v 9", 1)),
+        Some(all_but_last.to_owned()),
+        Some(format!("{all_but_last}\n{turned}\n")),
+        Some(format!("{text}f 1 2 3\n")),
+        None,
+    ] {
+        match damaged {
+            Some(text) => std::fs::write(&path, text).expect("writable"),
+            None => std::fs::remove_file(&path).expect("there"),
+        }
+        let output = crate::command::program().arg("verify").arg(&atlas).output();
+        let output = output.expect("the program starts");
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert!(
+            said.contains("FAIL  quads.obj holds the quad mesh"),
+            "{said}"
+        );
+        assert_eq!(output.status.code(), Some(1));
+    }
+}
+
+/// A mesh that a build gives vertices to before it looks for cones: what `check` and `explain` say of it is what comes of it.
+#[test]
+fn check_and_explain_know_the_mesh_that_is_built() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mesh = folder.path().join("triangle.obj");
+    std::fs::write(&mesh, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("written");
+    let built = build(&mesh, &[]);
+    let cones = document(&built.atlas())["cones"].clone();
+    let cones = cones.as_array().expect("cones").len();
+    let said = |command: &str| {
+        let output = crate::command::program().arg(command).arg(&mesh).output();
+        String::from_utf8_lossy(&output.expect("the program starts").stdout).into_owned()
+    };
+    let (check, explain) = (said("check"), said("explain"));
+    assert!(!check.contains("no grid"), "{check}");
+    assert!(explain.contains(&format!(" {cones} cones:")), "{explain}");
+    let advice = explain.contains("images.domain = \"flat\"");
+    assert!(advice, "cones.count changes nothing on a grid: {explain}");
+}
+
 /// Cells of a quad mesh: area, and curvature towards the neighbour that it bends most to (angle between normals by distance).
 fn cells(atlas: &Path) -> Vec<[f64; 2]> {
     let positions: Vec<f64> = array(atlas, "quad_positions");

@@ -24,13 +24,13 @@ fn fixture(name: &str) -> PathBuf {
     Path::new("fixtures/good").join(name)
 }
 
-/// Rebuilds what a setting makes: the mesh has the surface's topology, says how far it is, and the build says the same, for what may lie `beyond` the
-/// largest distance. Gives the PSNR, and the mean angle between normals.
+/// Rebuilds what a setting makes: the mesh has the surface's topology, says how far it is, and the build says the same within so many decibels. Gives
+/// the PSNR, the mean angle between normals, and the document.
 fn comes_back(
     name: &str,
     (genus, loops): (i64, usize),
     setting: &str,
-    beyond: f64,
+    within: f64,
 ) -> (f64, f64, serde_json::Value) {
     let built = build(&fixture(name), &[setting]);
     let atlas = built.atlas();
@@ -50,13 +50,13 @@ fn comes_back(
     let stated = quality["image_psnr_db"].as_f64().expect("stated");
     // The build measures fewer samples.
     assert!(
-        (psnr - stated).abs() < 0.5 || psnr.min(stated) > 140.0,
+        (psnr - stated).abs() < within || psnr.min(stated) > 140.0,
         "{name} {setting}: {psnr} {stated}"
     );
     let hausdorff = figures["compared"]["hausdorff"].as_f64().expect("a number");
     let stated = quality["image_hausdorff"].as_f64().expect("stated");
     assert!(
-        stated <= beyond * hausdorff || psnr > 140.0,
+        stated <= 1.5 * hausdorff || psnr > 140.0,
         "{name} {setting}: {stated} of {hausdorff}"
     );
     let angle = quality["image_normal_error"]["mean"].as_f64();
@@ -68,7 +68,7 @@ fn comes_back_from_flat(name: &str, genus: i64, loops: usize) {
     let mut last = 0.0;
     for side in [64, 256] {
         let budget = format!("patches.texel_budget={}", side * side);
-        let (psnr, angle, document) = comes_back(name, (genus, loops), &budget, 1.5);
+        let (psnr, angle, document) = comes_back(name, (genus, loops), &budget, 0.5);
         // Normals are off by the angle that the surface turns by within a texel.
         let number = |i: &serde_json::Value, side: &str| i[side].as_f64().expect("a number");
         let images = document["patches"].as_array().expect("images").iter();
@@ -86,7 +86,7 @@ fn comes_back_from_flat(name: &str, genus: i64, loops: usize) {
     }
 }
 
-/// From the blocks of a grid, which a build measures in another way: finer is nearer.
+/// From the blocks of a grid, which a build measures in another way, as near as docs/output.md says: finer is nearer.
 #[test]
 fn from_blocks() {
     for (name, genus, loops) in [
@@ -97,7 +97,7 @@ fn from_blocks() {
     ] {
         let at = |samples: usize| {
             let setting = format!("grid.samples_per_cell={samples}");
-            let (psnr, angle, _) = comes_back(name, (genus, loops), &setting, 1.5);
+            let (psnr, angle, _) = comes_back(name, (genus, loops), &setting, 1.1);
             (psnr, angle)
         };
         let (coarse, fine) = (at(2), at(8));

@@ -42,7 +42,12 @@ pub(super) struct Flat {
     source_face: Vec<u32>,
     cones: Vec<Cone>,
     of: Vec<Option<FaceDistortion>>,
+    /// Whether all transitions are quarter turns, as a grid needs them.
+    has_quarter_turns: bool,
 }
+
+/// What makes less of the distortion of a grid.
+const FEWER_LINES: &str = "a larger features.angle asks for fewer lines along edges, images.domain = \"flat\" for no grid, and takes cones.count";
 
 /// Faces that hang together.
 struct Region {
@@ -74,6 +79,7 @@ impl Flat {
             source_face: mesh.source_face.as_slice().to_vec(),
             cones: cones.collect(),
             of: crate::report::face_distortions(mesh, metric).into_vec(),
+            has_quarter_turns: metric.quarter_turns.is_some(),
         }
     }
 
@@ -86,6 +92,7 @@ impl Flat {
             .map(corners)
             .zip(stored.flat_length.iter().copied());
         let of = distortions(rows);
+        let has_quarter_turns = stored.turns.is_some();
         let cones = stored.cones.iter().map(|cone| Cone {
             vertex: cone.vertex,
             source_vertex: cone.source_vertex,
@@ -94,6 +101,7 @@ impl Flat {
         Flat {
             cones: cones.collect(),
             of,
+            has_quarter_turns,
             positions: stored.positions,
             faces: stored.faces,
             source_face: stored.source_face,
@@ -107,7 +115,7 @@ impl Flat {
         let std = self.deviation();
         if std < EVEN {
             lines.push(format!(
-                "hardly distorted: the standard deviation of the log scale is {std:.3}, below {EVEN}; nothing to change"
+                "hardly distorted: the standard deviation of the log scale is {std:.3}, below {EVEN}"
             ));
         } else {
             let (mut far, mut peaks) = (0, Vec::new());
@@ -273,6 +281,11 @@ impl Flat {
     /// Measured on spot, camelhead, bunny and nefertiti: twice as many cones lower the deviation by 0.37 to 0.47 of itself; limits on
     /// curvature lower the peaks (on spot from a factor of 6.0 to 2.0), but with as many cones raise the deviation.
     fn advice(&self, far: usize, peaks: &[(Mark, f64)]) -> Vec<String> {
+        if self.has_quarter_turns {
+            return vec![format!(
+                "to change: a grid has its cones where its cross field turns, however many are asked for: {FEWER_LINES}"
+            )];
+        }
         let count = self.cones.len();
         let more = (2 * count).max(4);
         let mut lines = Vec::new();
@@ -342,11 +355,16 @@ impl Flat {
             percent(share)
         )];
         if share > EXTREME {
-            lines.push(format!(
-                "to change: faces there are large for how much the surface bends: divide them until less than {} of the area is above {SHEARED} rad (now {}); where flow.scheme is not \"vertex-scaling\", that one keeps angles better",
-                percent(EXTREME),
-                percent(share)
-            ));
+            lines.push(match self.has_quarter_turns {
+                true => format!(
+                    "to change: quarter turns, and lines of the grid along sharp edges and borders, shear the surface there: {FEWER_LINES}"
+                ),
+                false => format!(
+                    "to change: faces there are large for how much the surface bends: divide them until less than {} of the area is above {SHEARED} rad (now {}); where flow.scheme is not \"vertex-scaling\", that one keeps angles better",
+                    percent(EXTREME),
+                    percent(share)
+                ),
+            });
         }
         lines
     }

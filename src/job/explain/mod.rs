@@ -10,9 +10,9 @@ mod distortion;
 mod failure;
 mod turns;
 
-use super::BuildError;
-use super::flatten::{Flattened, flatten, prescribed};
+use super::flatten::{Flattened, flatten, prepared_at_first, prescribed};
 use super::listing::counted;
+use super::{BuildError, shares};
 use crate::atlas::patch::Domain;
 use crate::config::Config;
 use crate::export::ExportError;
@@ -110,8 +110,11 @@ pub fn mesh(path: &Path, config: &Config) -> Result<Explanation, BuildError> {
         }
     };
     let count = repaired.components.len();
-    let parts = repaired.components.into_iter().zip(requests).zip(of_flat);
-    for (i, ((component, requests), of_flat)) in parts.enumerate() {
+    let shares = shares::shares(&repaired.components);
+    let parts = repaired.components.into_iter().zip(shares);
+    let parts = parts.zip(requests.into_iter().zip(of_flat));
+    for (i, ((component, share), (requests, of_flat))) in parts.enumerate() {
+        let config = &shares::of_share(config, share)?;
         let name = format!("component {i}");
         let indent = match count {
             1 => "",
@@ -149,7 +152,7 @@ fn flat(
     config: &Config,
 ) -> Result<(Flat, Vec<String>), BuildError> {
     let frame = component.frame;
-    let mesh = component.mesh?;
+    let mesh = prepared_at_first(component.mesh?, requests, config)?;
     let prescription = prescribed(&mesh, requests, config)?;
     let Flattened {
         mesh,
