@@ -340,6 +340,12 @@ impl ConfigError {
                 "texts need quotes, lists need [ ], and each key stands once, on its own line"
                     .to_owned()
             }
+            Self::UnknownKey { key, .. } if is_section_below_another(key) => {
+                let section = key.rsplit('.').next().unwrap_or_default();
+                format!(
+                    "`{section}` is a section of its own: write `[{section}]` on a line before its keys"
+                )
+            }
             Self::UnknownKey {
                 nearest: Some(nearest),
                 ..
@@ -371,6 +377,12 @@ impl ConfigError {
             },
         }
     }
+}
+
+/// `run.grid`: what follows the heading `[run]` belongs to it.
+fn is_section_below_another(key: &str) -> bool {
+    let below = key.split_once('.').map(|(_, below)| below);
+    below.is_some_and(|below| super::keys::sections().contains(&below))
 }
 
 fn list(words: &[&str]) -> String {

@@ -244,6 +244,19 @@ fn unknown_key_like_no_other() {
 }
 
 #[test]
+fn a_section_below_another() {
+    insta::assert_snapshot!(config_refusal("[run]\nthreads = 2\ngrid.cells = 3\n"), @r"
+     error: unknown key `run.grid`
+      ,-[config.toml:3:1]
+    2 | threads = 2
+    3 | grid.cells = 3
+      : ^^^^
+      `----
+     help: `grid` is a section of its own: write `[grid]` on a line before its keys
+    ");
+}
+
+#[test]
 fn unknown_choice() {
     insta::assert_snapshot!(config_refusal("[flow]\nscheme = \"inversive\"\n"), @r#"
      error: `flow.scheme` has no choice "inversive"

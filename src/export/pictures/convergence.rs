@@ -49,6 +49,12 @@ impl Course<'_> {
         }
     }
 
+    /// Times to be named, about so many; whole ones where all steps are at whole times, as iterations are.
+    pub fn time_ticks(&self, most: f64) -> Vec<f64> {
+        let are_whole = self.points.iter().all(|(_, p)| p[0].fract() == 0.0);
+        ticks([0.0, self.last], f64::from(u8::from(are_whole)), most)
+    }
+
     /// Where a point lies between left and right, and between top and bottom, 0 to 1.
     pub fn place(&self, [time, error]: [f64; 2]) -> [f64; 2] {
         [
@@ -81,7 +87,7 @@ pub fn convergence(atlas: &AffineAtlas, size: usize) -> RgbImage {
     };
     let mut canvas = Canvas::new(width, height, PAPER);
     let decades = ticks([low, high], 1.0, area[1] / 34.0);
-    let times = ticks([0.0, last], 0.0, area[0] / 90.0);
+    let times = course.time_ticks(area[0] / 90.0);
     let mut line = |from, to, thickness, colour| {
         canvas.line(place(from), place(to), thickness, colour);
     };

@@ -77,7 +77,7 @@ pub(super) fn convergence(history: &[FlowStep], tolerance: f64, time: &str) -> S
     for decade in ticks([course.low, course.high], 1.0, 7.0) {
         tick_beside(&mut out, place([0.0, decade])[1], &format!("1e{decade:.0}"));
     }
-    for t in ticks([0.0, course.last], 0.0, 5.0) {
+    for t in course.time_ticks(5.0) {
         tick_below(&mut out, place([t, 0.0])[0], &short(t));
     }
     axes(&mut out, time, "max |K − K̄| [rad]");
