@@ -316,9 +316,14 @@ impl Process {
         }
         // One that did not get as far as to take its job: there was no memory for its first thread, or for the program.
         if let (Some(cap), Some(2 | 127)) = (self.memory, status.and_then(|status| status.code())) {
-            return no_memory(format!(
-                "could not begin within the {cap} bytes of run.memory: raise run.memory"
-            ));
+            return no_memory(match self.is_share {
+                true => format!(
+                    "could not begin within the {cap} bytes that are its share of the memory that was free: let fewer run at a time (run.jobs), or set run.memory"
+                ),
+                false => format!(
+                    "could not begin within the {cap} bytes of run.memory: raise run.memory"
+                ),
+            });
         }
         if signal == Some(9) && ended_for_memory {
             return no_memory(format!(

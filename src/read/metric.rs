@@ -6,8 +6,10 @@
 
 use super::atlas::{FolderError, checked_json};
 use super::npz::Npz;
+use crate::atlas::patch::Domain;
 use crate::geometry::ids::NONE;
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 use std::path::Path;
 
 /// A vertex of prescribed curvature.
@@ -53,6 +55,8 @@ pub struct StoredMetric {
     pub cones: Vec<StoredCone>,
     /// Where all transitions are quarter turns because that was asked for.
     pub turns: Option<StoredTurns>,
+    /// What images, quads and coordinates lie on.
+    pub domain: Domain,
 }
 
 #[derive(Deserialize)]
@@ -64,6 +68,8 @@ struct Document {
     quality: Quality,
     #[serde(default)]
     features: Vec<Feature>,
+    /// Absent where there is none.
+    grid: Option<IgnoredAny>,
 }
 
 #[derive(Default, Deserialize)]
@@ -154,6 +160,10 @@ fn arrays(path: &Path, document: Document) -> Result<StoredMetric, String> {
         }
         None => None,
     };
+    let domain = match document.grid {
+        Some(_) => Domain::Grid,
+        None => Domain::Flat,
+    };
     let cones = document.cones;
     for (name, numbers) in [("positions", &positions), ("flat_length", &flat_length)] {
         if let Some(i) = numbers.iter().position(|x| !x.is_finite()) {
@@ -183,5 +193,6 @@ fn arrays(path: &Path, document: Document) -> Result<StoredMetric, String> {
         source_face,
         cones,
         turns,
+        domain,
     })
 }

@@ -6,6 +6,7 @@
 //! is a feature, such as an ear, whose curvature has no cone of its own to gather it.
 
 use super::counted;
+use crate::atlas::patch::Domain;
 use crate::export::glb::marked::{Mark, Marked};
 use crate::flow::cones::{Prescription, in_pi};
 use crate::flow::ricci::FlatMetric;
@@ -42,12 +43,10 @@ pub(super) struct Flat {
     source_face: Vec<u32>,
     cones: Vec<Cone>,
     of: Vec<Option<FaceDistortion>>,
-    /// Whether all transitions are quarter turns, as a grid needs them.
+    domain: Domain,
+    /// Whether all transitions are quarter turns.
     has_quarter_turns: bool,
 }
-
-/// What makes less of the distortion of a grid.
-const FEWER_LINES: &str = "a larger features.angle asks for fewer lines along edges, images.domain = \"flat\" for no grid, and takes cones.count";
 
 /// Faces that hang together.
 struct Region {
@@ -64,6 +63,7 @@ impl Flat {
         metric: &FlatMetric,
         prescription: &Prescription,
         frame: &Frame,
+        domain: Domain,
     ) -> Flat {
         let cones = prescription.cones.iter().map(|cone| {
             let source = mesh.source_vertex[cone.vertex];
@@ -79,6 +79,7 @@ impl Flat {
             source_face: mesh.source_face.as_slice().to_vec(),
             cones: cones.collect(),
             of: crate::report::face_distortions(mesh, metric).into_vec(),
+            domain,
             has_quarter_turns: metric.quarter_turns.is_some(),
         }
     }
@@ -101,6 +102,7 @@ impl Flat {
         Flat {
             cones: cones.collect(),
             of,
+            domain: stored.domain,
             has_quarter_turns,
             positions: stored.positions,
             faces: stored.faces,
@@ -281,10 +283,8 @@ impl Flat {
     /// Measured on spot, camelhead, bunny and nefertiti: twice as many cones lower the deviation by 0.37 to 0.47 of itself; limits on
     /// curvature lower the peaks (on spot from a factor of 6.0 to 2.0), but with as many cones raise the deviation.
     fn advice(&self, far: usize, peaks: &[(Mark, f64)]) -> Vec<String> {
-        if self.has_quarter_turns {
-            return vec![format!(
-                "to change: a grid has its cones where its cross field turns, however many are asked for: {FEWER_LINES}"
-            )];
+        if self.domain == Domain::Grid {
+            return vec!["to change: a grid has its cones where its cross field turns, however many are asked for: a larger features.angle asks for fewer lines along edges, and images.domain = \"flat\" for no grid; flat patches take cones.count".to_owned()];
         }
         let count = self.cones.len();
         let more = (2 * count).max(4);
@@ -355,11 +355,10 @@ impl Flat {
             percent(share)
         )];
         if share > EXTREME {
-            lines.push(match self.has_quarter_turns {
-                true => format!(
-                    "to change: quarter turns, and lines of the grid along sharp edges and borders, shear the surface there: {FEWER_LINES}"
-                ),
-                false => format!(
+            lines.push(match (self.domain, self.has_quarter_turns) {
+                (Domain::Grid, _) => "to change: quarter turns, and lines of the grid along sharp edges and borders, shear the surface there: a larger features.angle asks for fewer lines, and images.domain = \"flat\" for no grid".to_owned(),
+                (Domain::Flat, true) => "to change: quarter turns shear the surface where it has handles: flow.holonomy = \"free\" keeps its angles, and cones whose directions fit need less (cones.strategy = \"field\")".to_owned(),
+                (Domain::Flat, false) => format!(
                     "to change: faces there are large for how much the surface bends: divide them until less than {} of the area is above {SHEARED} rad (now {}); where flow.scheme is not \"vertex-scaling\", that one keeps angles better",
                     percent(EXTREME),
                     percent(share)

@@ -162,7 +162,9 @@ fn flat(
     } = flatten(mesh, prescription, config, &(), &|_| Ok(()))?;
     let turns = metric.quarter_turns.as_ref();
     let turns = turns.map_or_else(Vec::new, |met| turns::describe(&turns::of(met, &mesh)));
-    Ok((Flat::of(&mesh, &metric, &prescription, &frame), turns))
+    let domain = config.domain();
+    let flat = Flat::of(&mesh, &metric, &prescription, &frame, domain);
+    Ok((flat, turns))
 }
 
 /// Explains what a build wrote: where the atlas is distorted.

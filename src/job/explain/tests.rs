@@ -122,3 +122,20 @@ fn loops_and_features_of_a_seamless_metric_are_told() {
     assert!(text.contains("6 independent loops turn by"), "{text}");
     assert!(text.contains("nearest conformal map"), "{text}");
 }
+
+/// Settings for grids are no advice for flat patches whose turns happen to be quarters.
+#[test]
+fn advice_is_for_the_domain_that_is_built() {
+    let on = |domain| {
+        let text = explained("good/genus-3-pretzel.obj", |config| {
+            config.images.domain = Some(domain);
+            config.cones.strategy = crate::flow::cones::ConeStrategy::Field;
+            config.flow.holonomy = crate::flow::ricci::Holonomy::QuarterTurns;
+        });
+        text.to_string()
+    };
+    let (grid, flat) = (on(Domain::Grid), on(Domain::Flat));
+    assert!(grid.contains("features.angle"), "{grid}");
+    assert!(!flat.contains("features.angle"), "{flat}");
+    assert!(flat.contains("to change: "), "{flat}");
+}
