@@ -334,6 +334,43 @@ fn a_tetrahedron_has_a_grid() {
     assert!(number(&document(&atlas)["grid"]["cells"]) >= 6);
 }
 
+/// Vertices on edges of faces that are flat together lie on one line, beside borders too: flat faces are not to have three of them for corners.
+#[test]
+fn rectangles_of_four_triangles_have_grids() {
+    let mut state = 2_u64;
+    let mut random = || {
+        state = state.wrapping_mul(6364136223846793005);
+        state = state.wrapping_add(1442695040888963407);
+        (state >> 33) as f64 / (1_u64 << 31) as f64
+    };
+    let mut text = String::new();
+    for k in 0..40 {
+        let (wide, long) = (0.05, 0.05 * (1.0 + 5.0 * random()));
+        let (sin, cos) = (6.0 * random()).sin_cos();
+        let inside = [0, 1].map(|_| 0.2 + 0.6 * random());
+        let corners = [[0.0, 0.0], [wide, 0.0], [0.0, long], [wide, long]];
+        for [x, y] in (corners.into_iter()).chain([[inside[0] * wide, inside[1] * long]]) {
+            let (x, y) = (cos * x - sin * y, sin * x + cos * y);
+            // Five digits: no angle is a quarter turn.
+            text += &format!("v {:.5} {:.5} {:.5}\n", f64::from(k) + x, 0.8 * y, 0.6 * y);
+        }
+        for face in [[1, 3, 5], [3, 4, 5], [4, 2, 5], [2, 1, 5]] {
+            let [a, b, c] = face.map(|v| 5 * k + v);
+            text += &format!("f {a} {b} {c}\n");
+        }
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mesh = folder.path().join("rectangles.obj");
+    std::fs::write(&mesh, text).expect("written");
+    let built = build(&mesh, &["grid.cells=8000", "report.enabled=false"]);
+    let atlases = built.atlases();
+    assert_eq!(atlases.len(), 40, "{}", built.message());
+    for atlas in atlases {
+        let no_grid = &document(&atlas)["no_grid"];
+        assert!(no_grid.is_null(), "{}: {no_grid}", atlas.display());
+    }
+}
+
 /// A polygon of hundreds of corners in a fan of needles: straight borders would cut it into far more faces than it has.
 #[test]
 fn where_no_grid_can_be_made_there_are_flat_patches_and_the_reason() {

@@ -14,7 +14,7 @@ use crate::flow::schemes::FaceShape;
 use crate::flow::seamless::{SeamlessError, SeamlessParams, SeamlessStep, Start, seamless};
 use crate::flow::signature::Signature;
 use crate::flow::step::FlowStep;
-use crate::flow::straighten::{StraightenError, straighten};
+use crate::flow::straighten::{StraightenError, Straightened, straighten};
 use crate::flow::surface_delaunay::SurfaceDelaunay;
 use crate::flow::vertex_scale::nearest_scale;
 use crate::geometry::connectivity::Connectivity;
@@ -191,7 +191,16 @@ fn straighten_mirror(
     let mirror: Vec<EdgeId> = border.map(|h| base.edge(h)).collect();
     let mut whole = flat.clone();
     match straighten(&mut whole, base, &mirror) {
-        Ok(_) => *flat = whole,
+        Ok(Straightened { flips, edge }) => {
+            if !flips.is_empty() {
+                // Faces beside the mirror may have their corners on one line now: Delaunay, but for the mirror.
+                let mut held = EdgeVec::filled(false, whole.connectivity.edge_count());
+                edge.into_iter().for_each(|e| held[e] = true);
+                whole = whole.holding(held);
+                whole.flip_in_the_surface();
+            }
+            *flat = whole;
+        }
         Err(_) => {
             straighten(flat, base, lines)?;
         }
