@@ -449,7 +449,7 @@ pub const KEYS: &[Key] = &[
         "flow.conformality",
         Kind::Number { min: 0.0, max: 1e6 },
         "",
-        "0.0",
+        "0.1",
     ),
     key(
         "flow.solver",

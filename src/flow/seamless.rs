@@ -68,7 +68,7 @@ impl Default for SeamlessParams {
     fn default() -> Self {
         Self {
             tolerance: 1e-10,
-            conformality: 0.0,
+            conformality: 0.1,
             max_steps: 100,
         }
     }

@@ -38,7 +38,7 @@ pub struct FlowParams {
     /// What loops around handles may turn by; `quarter-turns` needs `vertex-scaling` with `delaunay`.
     pub holonomy: Holonomy,
     /// With `quarter-turns`: how much cheaper a change of scale is than one of shape. 0 keeps lengths as they are as well as possible, large values keep
-    /// angles.
+    /// angles. Without any, Newton's steps become short on fine meshes (`benches/README.md`).
     pub conformality: f64,
     /// Minimiser. `newton` takes a handful of steps; `gradient` follows the flow itself, thousands of times slower on large meshes.
     pub solver: Solver,
@@ -67,7 +67,7 @@ impl Default for FlowParams {
             scheme: Scheme::default(),
             delaunay: true,
             holonomy: Holonomy::default(),
-            conformality: 0.0,
+            conformality: 0.1,
             solver: Solver::default(),
             curvature_tolerance: 1e-10,
             max_newton_steps: 200,
