@@ -25,13 +25,13 @@ pub type Row = [f64; LANES];
 const LARGE: [usize; 2] = [12, 16];
 
 /// Some consecutive columns of the factor that have the same rows below their diagonal block.
-struct Supernode<'a> {
+pub(super) struct Supernode<'a> {
     /// The first of its unknowns.
-    start: usize,
+    pub start: usize,
     /// Number of its unknowns.
-    size: usize,
+    pub size: usize,
     /// Rows below the diagonal block.
-    below: &'a [u32],
+    pub below: &'a [u32],
     /// Column after column, the diagonal block on top.
     value: &'a [f64],
 }
@@ -52,16 +52,18 @@ impl SymmetricSolver {
         for (lane, &at) in positions.iter().enumerate().take(LANES) {
             columns[at as usize][lane] = 1.0;
         }
-        Arch::new().dispatch(SideBySide {
+        Arch::new().dispatch(ForwardSideBySide {
             solver: self,
             sides: columns,
         });
+        self.backward(columns);
         registers::free();
     }
 
     /// Replaces one right side, in the order of elimination, by the solution.
     pub fn solve_ordered(&self, side: &mut [f64]) {
-        Arch::new().dispatch(Alone { solver: self, side });
+        self.forward(side);
+        self.backward(side);
     }
 
     /// Replaces one right side by the solution.
@@ -77,14 +79,17 @@ impl SymmetricSolver {
         }
     }
 
-    fn supernodes(&self) -> impl DoubleEndedIterator<Item = Supernode<'_>> {
-        let raw = self.symbolic.raw();
-        let count = match raw {
+    pub(super) fn supernodes(&self) -> impl ExactSizeIterator<Item = Supernode<'_>> {
+        let count = match self.symbolic.raw() {
             _ if self.size == 0 => 0,
             SymbolicCholeskyRaw::Supernodal(symbolic) => symbolic.n_supernodes(),
             SymbolicCholeskyRaw::Simplicial(_) => self.size,
         };
-        (0..count).map(move |s| match raw {
+        (0..count).map(|s| self.supernode(s))
+    }
+
+    pub(super) fn supernode(&self, s: usize) -> Supernode<'_> {
+        match self.symbolic.raw() {
             SymbolicCholeskyRaw::Supernodal(symbolic) => {
                 let start = symbolic.supernode_begin()[s] as usize;
                 let value = &symbolic.col_ptr_for_val()[s..];
@@ -106,17 +111,17 @@ impl SymmetricSolver {
                     value: &self.factor[from..to],
                 }
             }
-        })
+        }
     }
 }
 
-/// Several right sides to be replaced by the solutions.
-struct SideBySide<'a> {
+/// Forward substitution of several right sides.
+struct ForwardSideBySide<'a> {
     solver: &'a SymmetricSolver,
     sides: &'a mut [Row],
 }
 
-impl WithSimd for SideBySide<'_> {
+impl WithSimd for ForwardSideBySide<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -127,33 +132,6 @@ impl WithSimd for SideBySide<'_> {
             if own.iter().any(|x| *x != 0.0) {
                 node.forward::<S>(self.sides, &mut rows);
             }
-        }
-        for node in self.solver.supernodes().rev() {
-            node.backward::<S>(self.sides, &mut rows);
-        }
-    }
-}
-
-/// One right side.
-struct Alone<'a> {
-    solver: &'a SymmetricSolver,
-    side: &'a mut [f64],
-}
-
-impl WithSimd for Alone<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let mut rows = Vec::new();
-        for node in self.solver.supernodes() {
-            let own = &self.side[node.start..][..node.size];
-            if own.iter().any(|x| *x != 0.0) {
-                node.forward_one::<S>(self.side, &mut rows);
-            }
-        }
-        for node in self.solver.supernodes().rev() {
-            node.backward_one::<S>(self.side, &mut rows);
         }
     }
 }
@@ -218,66 +196,59 @@ impl Supernode<'_> {
         }
     }
 
+    /// Backward substitution: the solution at its own unknowns, from `rows`, that at the rows below.
     #[inline(always)]
-    fn backward<S: Simd>(&self, x: &mut [Row], rows: &mut Vec<Row>) {
+    pub(super) fn backward<S: Simd>(&self, own: &mut [Row], rows: &[Row]) {
         let is_large = self.is_large();
         if is_large {
-            rows.clear();
-            rows.extend(self.below.iter().map(|&r| x[r as usize]));
             let sides = rows.as_flattened();
             let sides = MatRef::from_row_major_slice(sides, self.below.len(), LANES);
-            let own = x[self.start..][..self.size].as_flattened_mut();
+            let own = own.as_flattened_mut();
             let own = MatMut::from_row_major_slice_mut(own, self.size, LANES);
             let bottom = self.bottom().transpose();
             matmul(own, Accum::Add, bottom, sides, -1.0, Par::Seq);
         }
         for j in (0..self.size).rev() {
             let (top, bottom) = self.column(j);
-            let at = self.start + j;
-            let mut own = x[at];
-            for (l, row) in top[1..].iter().zip(&x[at + 1..]) {
-                subtract::<S>(&mut own, *l, row);
+            let mut x = own[j];
+            for (l, row) in top[1..].iter().zip(&own[j + 1..]) {
+                subtract::<S>(&mut x, *l, row);
             }
             if !is_large {
-                for (l, &r) in bottom.iter().zip(self.below) {
-                    subtract::<S>(&mut own, *l, &x[r as usize]);
+                for (l, row) in bottom.iter().zip(rows) {
+                    subtract::<S>(&mut x, *l, row);
                 }
             }
-            own.iter_mut().for_each(|x| *x /= top[0]);
-            x[at] = own;
+            x.iter_mut().for_each(|x| *x /= top[0]);
+            own[j] = x;
         }
     }
 
+    /// Forward substitution of one right side; `rows`: what is to be subtracted in the rows below.
     #[inline(always)]
-    fn forward_one<S: Simd>(&self, x: &mut [f64], rows: &mut Vec<f64>) {
+    pub(super) fn forward_one<S: Simd>(&self, own: &mut [f64], rows: &mut Vec<f64>) {
         rows.clear();
         rows.resize(self.below.len(), 0.0);
         for j in 0..self.size {
             let (top, bottom) = self.column(j);
-            let at = self.start + j;
-            x[at] /= top[0];
-            let own = x[at];
-            for (l, x) in top[1..].iter().zip(&mut x[at + 1..]) {
-                *x = multiply_add::<S>(-l, own, *x);
+            own[j] /= top[0];
+            let x = own[j];
+            for (l, y) in top[1..].iter().zip(&mut own[j + 1..]) {
+                *y = multiply_add::<S>(-l, x, *y);
             }
             for (l, row) in bottom.iter().zip(rows.iter_mut()) {
-                *row = multiply_add::<S>(*l, own, *row);
+                *row = multiply_add::<S>(*l, x, *row);
             }
-        }
-        for (row, &r) in rows.iter().zip(self.below) {
-            x[r as usize] -= row;
         }
     }
 
+    /// [`backward`](Self::backward) of one right side.
     #[inline(always)]
-    fn backward_one<S: Simd>(&self, x: &mut [f64], rows: &mut Vec<f64>) {
-        rows.clear();
-        rows.extend(self.below.iter().map(|&r| x[r as usize]));
+    pub(super) fn backward_one<S: Simd>(&self, own: &mut [f64], rows: &[f64]) {
         for j in (0..self.size).rev() {
             let (top, bottom) = self.column(j);
-            let at = self.start + j;
-            let own = x[at] - dot::<S>(&top[1..], &x[at + 1..]) - dot::<S>(bottom, rows);
-            x[at] = own / top[0];
+            let x = own[j] - dot::<S>(&top[1..], &own[j + 1..]) - dot::<S>(bottom, rows);
+            own[j] = x / top[0];
         }
     }
 }
@@ -322,6 +293,14 @@ mod tests {
 
     /// The Laplacian of a square grid of vertices, and a little more on the diagonal.
     fn grid(side: usize) -> SymmetricSolver {
+        let (pairs, diagonal, off) = laplacian(side);
+        let mut solver = SymmetricSolver::new(side * side, &pairs).unwrap();
+        solver.factorize(&diagonal, &off).unwrap();
+        solver
+    }
+
+    /// Its pairs, diagonal and off-diagonal values.
+    fn laplacian(side: usize) -> (Vec<[u32; 2]>, Vec<f64>, Vec<f64>) {
         let size = side * side;
         let at = |i: usize, j: usize| (i * side + j) as u32;
         let mut pairs = Vec::new();
@@ -331,7 +310,6 @@ mod tests {
                 pairs.push([at(j - 1, i), at(j, i)]);
             }
         }
-        let mut solver = SymmetricSolver::new(size, &pairs).unwrap();
         let weight: Vec<f64> = (0..pairs.len()).map(|p| 1.0 + (p % 7) as f64).collect();
         let mut diagonal = vec![0.01; size];
         for ([i, j], w) in pairs.iter().zip(&weight) {
@@ -339,8 +317,41 @@ mod tests {
             diagonal[*j as usize] += w;
         }
         let off: Vec<f64> = weight.iter().map(|w| -w).collect();
-        solver.factorize(&diagonal, &off).unwrap();
-        solver
+        (pairs, diagonal, off)
+    }
+
+    /// Where branches are substituted side by side it comes to the same, with the same bytes for any number of threads.
+    #[test]
+    fn branches_come_to_what_all_nodes_in_order_do() {
+        let side = 150;
+        let size = side * side;
+        let (pairs, diagonal, off) = laplacian(side);
+        let whole = grid(side);
+        let mut fronts = SymmetricSolver::new(size, &pairs).unwrap();
+        fronts = fronts.in_fronts(&pairs);
+        fronts.factorize(&diagonal, &off).unwrap();
+        let branches = fronts.fronts().for_substitution.as_ref().unwrap();
+        assert!(branches.runs.len() > 4 && branches.above.len() < size / 2);
+        let side: Vec<f64> = (0..size).map(|k| ((k * 37) % 101) as f64 - 50.0).collect();
+        let places: Vec<u32> = (0..LANES).map(|k| (k * size / LANES) as u32).collect();
+        let solved = |solver: &SymmetricSolver| {
+            let mut columns = Vec::new();
+            solver.columns(&places, &mut columns);
+            let mut one = side.clone();
+            solver.solve_ordered(&mut one);
+            (columns.into_flattened(), one)
+        };
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            pool.unwrap().install(|| solved(&fronts))
+        };
+        let (expected, found) = (solved(&whole), on(1));
+        assert_eq!(found, on(3));
+        for (expected, found) in [(&expected.0, &found.0), (&expected.1, &found.1)] {
+            let largest = expected.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            let parts = expected.iter().zip(found);
+            parts.for_each(|(x, y)| assert!((x - y).abs() < 1e-11 * largest, "{x} {y}"));
+        }
     }
 
     #[test]

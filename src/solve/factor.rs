@@ -68,6 +68,20 @@ pub(super) struct Fronts {
     /// Branches, whose nodes are worked out side by side with those of others, and the nodes above them, all in ascending order.
     branches: Vec<Vec<u32>>,
     above: Vec<u32>,
+    /// Where substitution can go through branches side by side.
+    pub for_substitution: Option<Branches>,
+}
+
+/// Branches as substitution needs them: rows below a node are in its own run, or above all branches.
+pub(super) struct Branches {
+    /// Consecutive nodes of each.
+    pub runs: Vec<Vec<Range<usize>>>,
+    /// Consecutive nodes above all of them.
+    pub nodes_above: Vec<Range<usize>>,
+    /// Their unknowns, in the order of elimination.
+    pub above: Vec<u32>,
+    /// Where each unknown stands among these.
+    pub place: Vec<u32>,
 }
 
 /// What a node subtracts from the rows below it: square, column after column, the lower triangle.
@@ -155,10 +169,48 @@ impl Fronts {
             child: Vec::new(),
             branches: Vec::new(),
             above: Vec::new(),
+            for_substitution: None,
         };
         fronts.link();
         fronts.divide();
+        fronts.for_substitution = fronts.for_substitution(&first, size);
         fronts
+    }
+
+    /// See [`Branches`]; `first`: the first unknown of every node, of `size` unknowns. None where there is one only, or where the order does not go through the elimination tree branch by branch.
+    fn for_substitution(&self, first: &[usize], size: usize) -> Option<Branches> {
+        let runs = |nodes: &Vec<u32>| {
+            let runs = nodes.chunk_by(|a, b| a + 1 == *b);
+            let ends = |run: &[u32]| Some(*run.first()? as usize..*run.last()? as usize + 1);
+            runs.filter_map(ends).collect::<Vec<_>>()
+        };
+        let of_branch: Vec<Vec<Range<usize>>> = self.branches.iter().map(runs).collect();
+        let mut run_of = vec![NONE; self.nodes.len()];
+        for (number, run) in (0..).zip(of_branch.iter().flatten()) {
+            run_of[run.clone()].fill(number);
+        }
+        let is_inside = |s: usize| {
+            let beyond = self.parent(s).map_or(NONE, |parent| run_of[parent]);
+            beyond == NONE || beyond == run_of[s]
+        };
+        let mut inner = of_branch.iter().flatten().flat_map(Range::clone);
+        if of_branch.len() < 2 || !inner.all(is_inside) {
+            return None;
+        }
+        let mut branches = Branches {
+            runs: of_branch,
+            nodes_above: runs(&self.above),
+            above: Vec::new(),
+            place: vec![NONE; size],
+        };
+        for &s in &self.above {
+            let from = first[s as usize];
+            for row in from..from + self.nodes[s as usize].size {
+                branches.place[row] = branches.above.len() as u32;
+                branches.above.push(row as u32);
+            }
+        }
+        Some(branches)
     }
 
     /// Children of the nodes.

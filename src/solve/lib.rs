@@ -14,6 +14,7 @@ mod dissection;
 mod factor;
 mod front;
 mod registers;
+mod substitution;
 
 pub use columns::{LANES, Row};
 
@@ -259,8 +260,13 @@ impl SymmetricSolver {
         };
         let workspace = MemBuffer::try_new(scratch).map_err(|_| too_large)?;
         let length = symbolic.len_val();
-        factor.reserve_exact(length.saturating_sub(factor.len()));
-        factor.resize(length, 0.0);
+        if factor.capacity() < length {
+            // In this order: there is no room for both. What the system gives is zero already, and each thread touches its own part first.
+            drop(factor);
+            factor = vec![0.0; length];
+        } else {
+            factor.resize(length, 0.0);
+        }
         Ok(Self {
             size,
             numeric,
