@@ -15,10 +15,11 @@ use crate::atlas::develop::{Development, diameter};
 use crate::atlas::plane::{RigidMotion, distance, doubled_area, wrap_angle};
 use crate::flow::prescription::Prescription;
 use crate::flow::ricci::FlatMetric;
-use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId, NONE};
+use crate::geometry::ids::{FaceId, FaceVec, HalfedgeId, NONE, VertexId};
 use crate::geometry::mesh::{Mesh, distance as distance3, triangle_area};
 use crate::geometry::triangle::{angles, area};
 use crate::product::{MeanMax, Quality, RmsMax, Spread, Verdict};
+use rayon::prelude::*;
 use std::collections::HashMap;
 use std::f64::consts::FRAC_PI_2;
 
@@ -182,16 +183,15 @@ pub fn cut_length(mesh: &Mesh, cut: &CutGraph) -> f64 {
 fn distortion_in(
     mesh: &Mesh,
     metric: &FlatMetric,
-    chart_area: impl Fn(FaceId) -> Option<f64>,
+    chart_area: impl Fn(FaceId) -> Option<f64> + Sync,
 ) -> Distortion {
     let c = &mesh.connectivity;
-    let rows: Vec<Row> = c
-        .faces()
-        .filter_map(|f| {
-            let flat = c.face_edges(f).map(|e| metric.length[e]);
-            row(mesh.face_positions(f), flat, chart_area(f)?)
-        })
-        .collect();
+    let faces = (0..c.face_count()).into_par_iter().map(FaceId::new);
+    let row = |f| {
+        let flat = c.face_edges(f).map(|e| metric.length[e]);
+        row(mesh.face_positions(f), flat, chart_area(f)?)
+    };
+    let rows: Vec<Row> = faces.filter_map(row).collect();
     let chart_total: f64 = rows.iter().map(|r| r.chart_area).sum();
     let (source_total, flat_total) = totals(rows.iter());
     let mut area_distortion = 0.0;
@@ -228,15 +228,14 @@ fn distortion_in(
 fn closing_error(mesh: &Mesh, cut: &CutGraph, central: &Development, metric: &FlatMetric) -> f64 {
     let c = &mesh.connectivity;
     let corner = |h: HalfedgeId| central.uv[c.face(h)][c.corner(h)];
-    let mut worst = central.closing_error;
-    for h in c.halfedges() {
+    let halfedges = (0..c.halfedge_count()).into_par_iter();
+    let error = halfedges.map(HalfedgeId::new).map(|h| {
         let (a, b) = (corner(h), corner(c.next(h)));
-        worst = worst.max((distance(a, b) - metric.length[c.edge(h)]).abs());
-        if let Some(t) = c.twin(h).filter(|_| !cut.is_cut[c.edge(h)]) {
-            worst = worst.max(distance(a, corner(c.next(t))));
-        }
-    }
-    worst
+        let of_length = (distance(a, b) - metric.length[c.edge(h)]).abs();
+        let across = c.twin(h).filter(|_| !cut.is_cut[c.edge(h)]);
+        across.map_or(of_length, |t| of_length.max(distance(a, corner(c.next(t)))))
+    });
+    error.reduce(|| central.closing_error, f64::max)
 }
 
 /// Worst residual of transitions and gluings, each applied again, relative to the chart's diameter
@@ -289,21 +288,20 @@ fn holonomy_error(
             }
         }
     }
+    let mut on_cut: Vec<VertexId> = along.keys().map(|&h| c.tail(h)).collect();
+    on_cut.sort_unstable();
+    on_cut.dedup();
     let mut worst = 0.0f64;
-    for v in c.vertices().filter(|&v| !c.is_boundary_vertex(v)) {
+    for v in on_cut.into_iter().filter(|&v| !c.is_boundary_vertex(v)) {
         let mut turn = 0.0;
-        let mut on_cut = false;
         for h in c.outgoing(v) {
             let segment = cut.segment[c.edge(h)];
             if segment != NONE {
-                on_cut = true;
                 // Counterclockwise around the tail the cut is crossed from right to left of h.
                 turn -= along[&h] * charts.gluings[segment as usize].motion.rotation;
             }
         }
-        if on_cut {
-            worst = worst.max(wrap_angle(turn - prescription.target[v]).abs());
-        }
+        worst = worst.max(wrap_angle(turn - prescription.target[v]).abs());
     }
     worst
 }

@@ -17,7 +17,8 @@ use crate::atlas::plane::{distance, rotation, wrap_angle};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, HalfedgeId, HalfedgeVec};
 use crate::geometry::triangle::angles;
-use std::cmp::Reverse;
+use rayon::prelude::*;
+use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 use std::f64::consts::PI;
 
@@ -261,12 +262,15 @@ impl<'a> Unfolder<'a> {
         cut: &'a CutGraph,
         copy: &'a HalfedgeVec<u32>,
     ) -> Result<Self, DevelopError> {
-        let face_angles = |face| {
-            let length = connectivity.face_edges(face).map(|e| length[e]);
-            angles(length).ok_or(DevelopError::BrokenFace { face, length })
-        };
-        let angles = connectivity.faces().map(face_angles);
-        let angles: FaceVec<_> = angles.collect::<Result<Vec<_>, _>>()?.into();
+        let lengths = |face| connectivity.face_edges(face).map(|e| length[e]);
+        let faces = (0..connectivity.face_count()).into_par_iter();
+        let found = faces.map(|f| angles(lengths(FaceId::new(f))));
+        let found: Vec<Option<[f64; 3]>> = found.collect();
+        let checked = connectivity.faces().zip(found).map(|(face, angles)| {
+            let length = lengths(face);
+            angles.ok_or(DevelopError::BrokenFace { face, length })
+        });
+        let angles: FaceVec<_> = checked.collect::<Result<Vec<_>, _>>()?.into();
         Ok(Self {
             connectivity,
             length,
@@ -319,16 +323,17 @@ impl<'a> Unfolder<'a> {
         let head = step(root.tail, l, root.direction);
         board.put(self.copy[root.halfedge], root.tail);
         board.put(self.copy[c.next(root.halfedge)], head);
-        // (size class, depth, halfedge through which the face is entered): large first, then breadth first.
-        let mut queue = BinaryHeap::new();
-        let class = |h: HalfedgeId| Reverse(self.length(h).log2().floor() as i64);
+        let entrance = |halfedge: HalfedgeId, depth, direction| Entrance {
+            class: self.length(halfedge).log2().floor() as i64,
+            depth: Reverse(depth),
+            halfedge: Reverse(halfedge),
+            direction,
+        };
         let mut mismatch = 0.0f64;
-        let mut directions = std::collections::HashMap::new();
-        directions.insert(root.halfedge, root.direction);
-        queue.push(Reverse((class(root.halfedge), 0u32, root.halfedge)));
-        while let Some(Reverse((_, depth, h))) = queue.pop() {
+        let mut queue = BinaryHeap::from([entrance(root.halfedge, 0, root.direction)]);
+        while let Some(entered) = queue.pop() {
+            let (h, direction) = (entered.halfedge.0, entered.direction);
             let f = c.face(h);
-            let direction = directions.remove(&h).unwrap_or_default();
             if board.is_placed[f] {
                 continue;
             }
@@ -358,11 +363,47 @@ impl<'a> Unfolder<'a> {
                     continue;
                 }
                 let across = wrap_angle(self.halfedge_direction(face_direction, side) + PI);
-                directions.insert(t, across);
-                queue.push(Reverse((class(t), depth + 1, t)));
+                queue.push(entrance(t, entered.depth.0 + 1, across));
             }
         }
         mismatch
+    }
+}
+
+/// How a face is entered: through large sides first, then breadth first.
+struct Entrance {
+    /// Binary logarithm of the side's length, rounded down.
+    class: i64,
+    depth: Reverse<u32>,
+    /// The side.
+    halfedge: Reverse<HalfedgeId>,
+    /// Its angle, radians.
+    direction: f64,
+}
+
+impl Entrance {
+    fn key(&self) -> (i64, Reverse<u32>, Reverse<HalfedgeId>) {
+        (self.class, self.depth, self.halfedge)
+    }
+}
+
+impl PartialEq for Entrance {
+    fn eq(&self, other: &Self) -> bool {
+        self.key() == other.key()
+    }
+}
+
+impl Eq for Entrance {}
+
+impl PartialOrd for Entrance {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Entrance {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.key().cmp(&other.key())
     }
 }
 

@@ -1,5 +1,7 @@
 //! Points in the order of the Morton curve, on which neighbours in space are mostly near each other.
 
+use rayon::prelude::*;
+
 /// Most bits of a coordinate in a code.
 const BITS: u32 = 21;
 
@@ -25,7 +27,7 @@ pub(crate) fn along_curve(count: usize, point: impl Fn(usize) -> [f64; 3]) -> (V
     let mut words: Vec<u64> = (0..count)
         .map(|number| code(point(number)) << of_number | number as u64)
         .collect();
-    words.sort_unstable();
+    words.par_sort_unstable();
     let numbers = words
         .iter()
         .map(|word| (word & ((1 << of_number) - 1)) as u32);

@@ -169,19 +169,12 @@ impl<'a> Publication<'a> {
         let atlas = &*atlas;
         go_on()?;
         observer.stage("verify", component, components);
-        let written = staging.path().join(&subfolder);
-        let (verdicts, extent) =
-            verify_atlas_and_measure(&written, &VerifyOptions::default(), None);
-        if let Some(unverified) = Unverified::of(&verdicts) {
-            staging.withdraw(&subfolder)?;
-            let precision = Precision::of(&verdicts, atlas, &self.asset.soup);
-            return Ok(Err(match precision {
-                Some(precision) => precision.into(),
-                None => unverified.into(),
-            }));
-        }
-        go_on()?;
-        observer.stage("pages", component, components);
+        let check = || {
+            let written = staging.path().join(&subfolder);
+            let found = verify_atlas_and_measure(&written, &VerifyOptions::default(), None);
+            observer.stage("pages", component, components);
+            found
+        };
         let is_one_of_few = components <= config.report.max_components;
         let has_page = config.report.enabled && is_one_of_few;
         let draw = || match config.pictures.enabled && is_one_of_few {
@@ -198,7 +191,17 @@ impl<'a> Publication<'a> {
             }
             false => Ok(()),
         };
-        let (drawn, described) = rayon::join(draw, describe);
+        // One after another where there is one thread. What is drawn of an atlas that does not pass is withdrawn with it.
+        let ((verdicts, extent), (drawn, described)) =
+            rayon::join(check, || rayon::join(draw, describe));
+        if let Some(unverified) = Unverified::of(&verdicts) {
+            staging.withdraw(&subfolder)?;
+            let precision = Precision::of(&verdicts, atlas, &self.asset.soup);
+            return Ok(Err(match precision {
+                Some(precision) => precision.into(),
+                None => unverified.into(),
+            }));
+        }
         drawn?;
         described?;
         go_on()?;

@@ -9,6 +9,7 @@ use crate::repair::clean::DraftFace;
 use crate::repair::glue::Gluing;
 use crate::repair::log::{Change, RepairLog};
 use crate::repair::{Component, ComponentError, Repaired};
+use rayon::prelude::*;
 
 /// Faces of a component that keep the order of the file. Larger components take it from the Morton curve: neighbours that lie far from each other in memory, as in
 /// files that were subdivided, make every stage half as slow again (200,000 vertices, `benches/README.md`); arrays of smaller ones fit into caches.
@@ -370,7 +371,7 @@ pub fn doubled_edges(connectivity: &Connectivity) -> Vec<EdgeId> {
             (a.min(b), a.max(b), e)
         })
         .collect();
-    edges.sort_unstable();
+    edges.par_sort_unstable();
     let mut doubled: Vec<EdgeId> = edges
         .chunk_by(|a, b| (a.0, a.1) == (b.0, b.1))
         .flat_map(|same| same[1..].iter().map(|x| x.2))

@@ -12,7 +12,7 @@
 
 use crate::geometry::mesh::distance;
 use crate::repair::log::{Change, RemovalReason};
-use std::collections::hash_map::Entry;
+use rayon::prelude::*;
 use std::collections::{BTreeSet, HashMap};
 
 /// A triangle is *collinear* where its two short sides together are not longer than its long side by more
@@ -68,33 +68,36 @@ pub fn clean(
 /// Of faces with the same three vertices the first stays, whatever the orientation of the others, unless they are a
 /// sheet that hangs on something: see [`drop_flaps`].
 fn drop_duplicates(faces: &mut Vec<DraftFace>, changes: &mut Vec<Change>) {
-    // Source face of the first, its orientation, and whether it comes the other way too.
-    let mut seen: HashMap<[u32; 3], (u32, bool, bool)> = HashMap::with_capacity(faces.len());
-    let mut any_two_sided = false;
-    faces.retain(|face| {
-        let (key, even) = sorted(face.vertices);
-        match seen.entry(key) {
-            Entry::Vacant(entry) => {
-                entry.insert((face.source, even, false));
-                true
-            }
-            Entry::Occupied(mut entry) => {
-                let (first, orientation, two_sided) = entry.get_mut();
-                *two_sided |= *orientation != even;
-                any_two_sided |= *two_sided;
-                changes.push(Change::RemovedFace {
-                    face: face.source,
-                    reason: RemovalReason::DuplicateOf(*first),
-                });
-                false
-            }
+    let mut by_vertices: Vec<([u32; 3], u32)> = (0..)
+        .zip(&*faces)
+        .map(|(i, face)| (sorted(face.vertices).0, i))
+        .collect();
+    // By vertices, and of equals the first first.
+    by_vertices.par_sort_unstable();
+    let mut first_of: Vec<u32> = (0..faces.len() as u32).collect();
+    let mut two_sided = vec![false; faces.len()];
+    for same in by_vertices.chunk_by(|a, b| a.0 == b.0) {
+        let first = same[0].1;
+        let even = |i: u32| sorted(faces[i as usize].vertices).1;
+        for &(_, i) in &same[1..] {
+            first_of[i as usize] = first;
+            two_sided[first as usize] |= even(i) != even(first);
         }
-    });
+    }
+    drop(by_vertices);
+    let is_first = |i: usize| first_of[i] as usize == i;
+    for i in (0..faces.len()).filter(|&i| !is_first(i)) {
+        changes.push(Change::RemovedFace {
+            face: faces[i].source,
+            reason: RemovalReason::DuplicateOf(faces[first_of[i] as usize].source),
+        });
+    }
+    let any_two_sided = two_sided.contains(&true);
+    let mut at = 0..;
+    two_sided.retain(|_| at.next().is_some_and(is_first));
+    let mut at = 0..;
+    faces.retain(|_| at.next().is_some_and(is_first));
     if any_two_sided {
-        let two_sided = faces
-            .iter()
-            .map(|f| seen[&sorted(f.vertices).0].2)
-            .collect();
         drop_flaps(faces, two_sided, changes);
     }
 }

@@ -6,6 +6,7 @@ use crate::geometry::ids::NONE;
 use crate::geometry::mesh::{cross, norm, sub};
 use crate::repair::clean::DraftFace;
 use crate::repair::log::Change;
+use rayon::prelude::*;
 
 /// The joints between faces.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,7 +39,7 @@ pub fn glue(faces: &[DraftFace], positions: &[[f64; 3]], changes: &mut Vec<Chang
             sides.push((a.min(b), a.max(b), (3 * f + k) as u32));
         }
     }
-    sides.sort_unstable();
+    sides.par_sort_unstable();
     let mut partner = vec![NONE; 3 * faces.len()];
     let edges = || sides.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
     for edge in edges().filter(|edge| edge.len() == 2) {

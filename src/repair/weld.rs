@@ -11,6 +11,7 @@
 use crate::geometry::mesh::{bounding_box, distance};
 use crate::repair::RepairParams;
 use crate::repair::log::Change;
+use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 
 /// An edge that is shorter than this part of the longest edge of each of its faces is one point: a few units in the last place of float32 coordinates.
@@ -68,7 +69,7 @@ fn open_vertices(vertices: usize, faces: &[[u32; 3]]) -> Vec<bool> {
         .filter(|(a, b)| a != b)
         .map(|(a, b)| (a.min(b), a.max(b)))
         .collect();
-    edges.sort_unstable();
+    edges.par_sort_unstable();
     let mut open = vec![false; vertices];
     for same in edges.chunk_by(|a, b| a == b) {
         if same.len() == 1 {

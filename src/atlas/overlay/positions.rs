@@ -83,9 +83,11 @@ pub enum PositionsError {
 /// triangulations; the result does not depend on the number of threads.
 pub fn positions(intrinsic: &Intrinsic, curves: &Curves) -> Result<Positions, PositionsError> {
     let (base, delaunay, flat) = (&intrinsic.base, &intrinsic.delaunay, &intrinsic.flat);
-    let base_on_delaunay = intrinsic.base_on_delaunay.trace(base, delaunay)?;
-    let delaunay_on_flat = intrinsic.delaunay_on_flat.trace(delaunay, flat)?;
-    placed(intrinsic, &base_on_delaunay, &delaunay_on_flat, curves)
+    let (base_on_delaunay, delaunay_on_flat) = rayon::join(
+        || intrinsic.base_on_delaunay.trace(base, delaunay),
+        || intrinsic.delaunay_on_flat.trace(delaunay, flat),
+    );
+    placed(intrinsic, &base_on_delaunay?, &delaunay_on_flat?, curves)
 }
 
 /// The same from curves that are traced already: A on B, B on C and A on C.

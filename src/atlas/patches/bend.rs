@@ -9,6 +9,7 @@ use super::demand::Sums;
 use super::slit::Slit;
 use crate::geometry::ids::{EdgeId, EdgeVec, FaceId, FaceVec, HalfedgeId};
 use crate::geometry::mesh::{Mesh, cross, norm, sub};
+use rayon::prelude::*;
 
 /// Cosine of the dihedral angle of a crease.
 const CREASE: f64 = 0.8;
@@ -28,7 +29,7 @@ pub(super) struct Bends {
 pub(crate) fn edge_bends(
     mesh: &Mesh,
     area: &FaceVec<f64>,
-    beside: impl Fn(HalfedgeId) -> Option<FaceId>,
+    beside: impl Fn(HalfedgeId) -> Option<FaceId> + Sync,
 ) -> (EdgeVec<[f64; 2]>, EdgeVec<bool>) {
     let c = &mesh.connectivity;
     let extent = mesh.diagonal().max(f64::MIN_POSITIVE);
@@ -49,17 +50,19 @@ pub(crate) fn edge_bends(
         (f != g).then(|| (f.min(g), f.max(g)))
     };
     // Edges between two source faces together, in ascending order as sums must be.
-    let edges = c.edges().filter_map(|e| Some((between(e)?, e)));
+    let edges = (0..c.edge_count()).into_par_iter().map(EdgeId::new);
+    let edges = edges.filter_map(|e| Some((between(e)?, e)));
     let mut edges: Vec<((u32, u32), EdgeId)> = edges.collect();
-    edges.sort_unstable();
+    edges.par_sort_unstable();
     let mut bend = EdgeVec::filled([0.0; 2], c.edge_count());
     let mut is_crease = EdgeVec::filled(false, c.edge_count());
-    for group in edges.chunk_by(|a, b| a.0 == b.0) {
+    let of_group = |group: &[((u32, u32), EdgeId)]| {
+        let mut rows = Vec::with_capacity(group.len());
         let lengths = group.iter().map(|&(_, e)| mesh.edge_length(e));
         let lengths: Vec<f64> = lengths.collect();
         let length: f64 = lengths.iter().sum();
         let Some(&((f, g), _)) = group.first() else {
-            continue;
+            return rows;
         };
         let ((n, of_n), (m, of_m)) = (normals[f as usize], normals[g as usize]);
         let cosine = (0..3).map(|i| n[i] * m[i]).sum::<f64>() / (norm(n) * norm(m));
@@ -68,10 +71,15 @@ pub(crate) fn edge_bends(
         for (&(_, e), length) in group.iter().zip(lengths) {
             let crease = square * length;
             if crease.is_finite() && apart > 0.0 && apart.is_finite() {
-                bend[e] = [crease, crease / apart];
-                is_crease[e] = cosine < CREASE;
+                rows.push((e, [crease, crease / apart], cosine < CREASE));
             }
         }
+        rows
+    };
+    let groups = edges.par_chunk_by(|a, b| a.0 == b.0);
+    let rows: Vec<_> = groups.flat_map_iter(of_group).collect();
+    for (e, bent, is_sharp) in rows {
+        (bend[e], is_crease[e]) = (bent, is_sharp);
     }
     (bend, is_crease)
 }
@@ -85,8 +93,9 @@ impl Bends {
             is_crease,
             of_face: FaceVec::default(),
         };
-        let faces = c.faces().map(|f| bends.inside(slit, f, |_| true));
-        bends.of_face = faces.collect();
+        let faces = (0..c.face_count()).into_par_iter().map(FaceId::new);
+        let of_face = faces.map(|f| bends.inside(slit, f, |_| true));
+        bends.of_face = of_face.collect::<Vec<_>>().into();
         bends
     }
 
@@ -113,7 +122,7 @@ impl Bends {
 /// Whole numbers from 0 on in the place of ids, the same where they are the same.
 fn numbers(ids: &FaceVec<u32>) -> FaceVec<u32> {
     let mut order: Vec<(u32, FaceId)> = ids.enumerate().map(|(f, &id)| (id, f)).collect();
-    order.sort_unstable();
+    order.par_sort_unstable();
     let mut numbers = FaceVec::filled(0, order.len());
     for (number, group) in (0..).zip(order.chunk_by(|a, b| a.0 == b.0)) {
         group.iter().for_each(|&(_, f)| numbers[f] = number);

@@ -54,17 +54,30 @@ pub(super) struct Divider<'a> {
     /// What a shorter side may ask for on the longer one.
     enough: f64,
     params: &'a PatchParams,
-    /// Spaces that nobody works in at the moment: each is as large as the surface, and most patches are small.
-    idle: Mutex<Vec<Scratch<'a>>>,
+    scratch: Idle<Scratch<'a>>,
+    /// Coordinates of copies.
+    own: Idle<Vec<[f64; 2]>>,
 }
 
-/// Space to work in, for one patch at a time.
+/// Spaces that nobody works in at the moment: each is as large as the surface, and most patches are small.
+struct Idle<T>(Mutex<Vec<T>>);
+
+impl<T> Idle<T> {
+    fn with<R>(&self, new: impl FnOnce() -> T, work: impl FnOnce(&mut T) -> R) -> R {
+        let idle = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = idle().pop();
+        let mut space = found.unwrap_or_else(new);
+        let result = work(&mut space);
+        idle().push(space);
+        result
+    }
+}
+
+/// Space to work in, for one set of faces at a time.
 struct Scratch<'a> {
     sets: Sets<'a>,
     /// Of [`Divider::by_creases`].
     label: FaceVec<u32>,
-    /// Coordinates of copies.
-    own: Vec<[f64; 2]>,
 }
 
 impl<'a> Scratch<'a> {
@@ -72,7 +85,6 @@ impl<'a> Scratch<'a> {
         Self {
             sets: Sets::new(slit),
             label: FaceVec::filled(0, slit.connectivity.face_count()),
-            own: vec![[0.0; 2]; slit.development.copies],
         }
     }
 }
@@ -94,36 +106,40 @@ impl<'a> Divider<'a> {
             budget: Budget::default(),
             enough: f64::INFINITY,
             params,
-            idle: Mutex::default(),
+            scratch: Idle(Mutex::default()),
+            own: Idle(Mutex::default()),
         }
     }
 
     fn with_scratch<T>(&self, work: impl FnOnce(&mut Scratch<'a>) -> T) -> T {
-        let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
-        let found = idle().pop();
-        let mut scratch = found.unwrap_or_else(|| Scratch::new(self.slit));
-        let result = work(&mut scratch);
-        idle().push(scratch);
-        result
+        self.scratch.with(|| Scratch::new(self.slit), work)
+    }
+
+    fn with_sets<T>(&self, work: impl FnOnce(&mut Sets<'a>) -> T) -> T {
+        self.with_scratch(|scratch| work(&mut scratch.sets))
+    }
+
+    fn with_own<T>(&self, work: impl FnOnce(&mut [[f64; 2]]) -> T) -> T {
+        let new = || vec![[0.0; 2]; self.slit.development.copies];
+        self.own.with(new, |own| work(own))
     }
 
     /// Areas and bend of patches.
     pub fn sums(&self, patches: &[Vec<FaceId>]) -> Vec<Sums> {
         parallel::map(patches, |_, faces| {
-            self.with_scratch(|scratch| self.sums_and_border(faces, &mut scratch.sets).0)
+            self.with_sets(|sets| self.sums_and_border(faces, sets).0)
         })
     }
 
     /// Finds what a texel is worth where the images are these, and their cost together.
     fn appraise(&mut self, patches: &[Vec<FaceId>]) -> f64 {
-        let demand = |scratch: &mut Scratch<'a>, faces: &Vec<FaceId>| {
-            let Scratch { sets, own, .. } = scratch;
+        let demand = |sets: &mut Sets<'a>, own: &mut [[f64; 2]], faces: &Vec<FaceId>| {
             let (sums, border) = self.sums_and_border(faces, sets);
             let placement = self.placed(faces, &border, sets, own);
             self.outline(sums, &border, &placement).demand
         };
         let demands: Vec<Demand> = parallel::map(patches, |_, faces| {
-            self.with_scratch(|scratch| demand(scratch, faces))
+            self.with_sets(|sets| self.with_own(|own| demand(sets, own, faces)))
         });
         self.enough = enough_long_side(demands.iter().map(shape), self.params);
         let coarsest = |d| coarsest(d, self.enough, self.params);
@@ -171,8 +187,11 @@ impl<'a> Divider<'a> {
     /// How patches are best divided.
     fn best_divisions(&self, patches: Vec<Vec<FaceId>>) -> Vec<Row> {
         let rows = patches.into_par_iter().with_max_len(1);
-        rows.map(|faces| self.with_scratch(|scratch| self.best_division(faces, scratch)))
-            .collect()
+        rows.map(|faces| {
+            let division = self.with_own(|own| self.best_division(&faces, own));
+            Row { faces, division }
+        })
+        .collect()
     }
 
     /// Coordinates of a patch with its border.
@@ -196,42 +215,41 @@ impl<'a> Divider<'a> {
     }
 
     /// How a patch is best divided.
-    fn best_division(&self, faces: Vec<FaceId>, scratch: &mut Scratch<'a>) -> Row {
+    fn best_division(&self, faces: &[FaceId], own: &mut [[f64; 2]]) -> Option<Division> {
         let slit = self.slit;
-        let Scratch { sets, label, own } = scratch;
-        let (sums, border) = self.sums_and_border(&faces, sets);
-        let placement = self.placed(&faces, &border, sets, own);
-        let outline = self.outline(sums, &border, &placement);
+        let (placement, outline) = self.with_sets(|sets| {
+            let (sums, border) = self.sums_and_border(faces, sets);
+            let placement = self.placed(faces, &border, sets, own);
+            let outline = self.outline(sums, &border, &placement);
+            (placement, outline)
+        });
         let now = self.cost(&outline.demand);
-        let mut tried = Vec::new();
-        for side in self.by_creases(&faces, sets, label) {
-            tried.extend(sets.components(&side));
-        }
-        let mut tried = vec![tried];
-        tried.extend(self.by_lines(&faces, &placement, &outline, sets));
-        tried.extend(self.by_scale(&faces, &outline, sets));
-        let mut found: Vec<(i64, Division)> = Vec::new();
-        for parts in tried {
-            let division = self.in_parts(parts, now, &placement, sets);
-            found.extend(division.map(|division| {
+        let tried = self.candidates(faces, &placement, &outline);
+        let found = parallel::map(&tried, |_, candidate| {
+            self.with_scratch(|scratch| {
+                let parts = self.connected(candidate, faces, &placement, &outline, scratch);
+                self.in_parts(parts, now, &placement, &mut scratch.sets)
+            })
+        });
+        let mut found: Vec<(i64, Division)> = (found.into_iter().flatten())
+            .map(|division| {
                 let share = division.saved / now.max(f64::MIN_POSITIVE);
                 let more = division.parts.len() as f64 - 1.0;
                 (-(share / more * 1e9) as i64, division)
-            }));
-        }
+            })
+            .collect();
         // Stable: of equals the first.
         found.sort_by_key(|f| f.0);
         let mut found = found.into_iter().map(|f| f.1);
         // What touches in the patch may overlap in a part, which is smaller and so is what counts as touching.
-        let mut is_injective = |(faces, border): (&Vec<FaceId>, &Vec<FaceId>)| {
+        let is_injective = |(faces, border): (&Vec<FaceId>, &Vec<FaceId>)| {
             let part = Placement::new(slit, placement.positions, border.iter().copied());
-            part.is_injective(sets, faces)
+            self.with_sets(|sets| part.is_injective(sets, faces))
         };
-        let division = found.find(|division| {
-            let mut parts = division.parts.iter().zip(&division.borders);
-            parts.all(&mut is_injective)
-        });
-        Row { faces, division }
+        found.find(|division| {
+            let parts = division.parts.par_iter().zip(&division.borders);
+            parts.with_max_len(1).all(is_injective)
+        })
     }
 
     /// A division into the disks that connected parts are made of; `None` where there is one only, or they cost more.

@@ -3,6 +3,7 @@
 use super::placement::{Placement, centroid, rounded_ln};
 use super::sets::{Sets, partition};
 use crate::geometry::ids::{FaceId, HalfedgeId};
+use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, HashMap};
 
@@ -89,6 +90,8 @@ fn area_and_middle(points: impl ExactSizeIterator<Item = [f64; 2]> + Clone) -> (
 
 /// Directions of the lines that are tried through a hole.
 const DIRECTIONS: usize = 8;
+/// Faces that one thread looks at: as many for any number of threads, since sums are rounded.
+const CHUNK: usize = 1 << 14;
 
 /// The faces on both sides of the line through a point that cuts the shortest way, of eight directions.
 fn halves(
@@ -106,33 +109,45 @@ fn halves(
     });
     // A bit a line, set for the faces on its left.
     let tolerance = placement.tolerance();
-    let mut count = [0; DIRECTIONS];
-    for &f in faces {
+    let sides = |&f: &FaceId| {
         let p = centroid(&placement.triangle(slit, f));
         let p = [p[0] - centre[0], p[1] - centre[1]];
-        let mut sides = 0;
-        for (i, d) in directions.iter().enumerate() {
-            let is_left = d[0] * p[1] - d[1] * p[0] > -tolerance;
-            sides |= u8::from(is_left) << i;
-            count[i] += usize::from(is_left);
-        }
-        sets.sides[f] = sides;
+        let is_left = |d: &[f64; 2]| d[0] * p[1] - d[1] * p[0] > -tolerance;
+        let bits = directions.iter().enumerate();
+        bits.fold(0, |bits, (i, d)| bits | u8::from(is_left(d)) << i)
+    };
+    let sides = faces.par_iter().with_min_len(CHUNK).map(sides);
+    let sides: Vec<u8> = sides.collect();
+    let mut count_of = [0; 1 << DIRECTIONS];
+    for (&f, bits) in faces.iter().zip(sides) {
+        sets.sides[f] = bits;
+        count_of[usize::from(bits)] += 1;
     }
-    let mut cut = [0.0; DIRECTIONS];
-    for &f in faces {
-        for h in slit.connectivity.face_halfedges(f) {
-            let Some(n) = slit.beside(h) else { continue };
-            // Hardly any two neighbours have a line between them.
-            let between = sets.sides[f] & !sets.sides[n];
-            if between != 0 && sets.stamp[n] == stamp {
-                for (i, cut) in cut.iter_mut().enumerate() {
-                    if between >> i & 1 == 1 {
-                        *cut += slit.length[slit.connectivity.edge(h)];
+    let count: [usize; DIRECTIONS] = std::array::from_fn(|i| {
+        let is_left = |bits: &usize| bits >> i & 1 == 1;
+        let all = (0..count_of.len()).filter(is_left);
+        all.map(|bits| count_of[bits]).sum()
+    });
+    let of_chunk = |faces: &[FaceId]| {
+        let mut cut = [0.0; DIRECTIONS];
+        for &f in faces {
+            for h in slit.connectivity.face_halfedges(f) {
+                let Some(n) = slit.beside(h) else { continue };
+                // Hardly any two neighbours have a line between them.
+                let between = sets.sides[f] & !sets.sides[n];
+                if between != 0 && sets.stamp[n] == stamp {
+                    for (i, cut) in cut.iter_mut().enumerate() {
+                        if between >> i & 1 == 1 {
+                            *cut += slit.length[slit.connectivity.edge(h)];
+                        }
                     }
                 }
             }
         }
-    }
+        cut
+    };
+    let chunks: Vec<[f64; DIRECTIONS]> = faces.par_chunks(CHUNK).map(of_chunk).collect();
+    let cut: [f64; DIRECTIONS] = std::array::from_fn(|i| chunks.iter().map(|cut| cut[i]).sum());
     let best = (0..DIRECTIONS)
         .filter(|&i| count[i] > 0 && count[i] < faces.len())
         .min_by_key(|&i| (rounded_ln(cut[i] / placement.extent), i));

@@ -20,6 +20,7 @@ use super::placement::{Placement, centroid, place, rounded_ln};
 use super::sets::{Sets, in_order, partition};
 use super::slit::Slit;
 use crate::geometry::ids::FaceId;
+use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -34,7 +35,7 @@ pub(super) fn segment(slit: &Slit, range: f64) -> Vec<Vec<FaceId>> {
     let mut own = vec![[0.0; 2]; slit.development.copies];
     let mut queue = BinaryHeap::new();
     let mut all: Vec<FaceId> = slit.connectivity.faces().collect();
-    all.sort_by(|&a, &b| {
+    all.par_sort_unstable_by(|&a, &b| {
         let key = |f: FaceId| slit.log_scale[f];
         key(a).total_cmp(&key(b)).then(a.cmp(&b))
     });

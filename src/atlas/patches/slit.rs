@@ -13,6 +13,7 @@ use crate::atlas::plane;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, HalfedgeId, HalfedgeVec, NONE, VertexVec};
 use crate::geometry::mesh::{Mesh, distance, triangle_area};
+use rayon::prelude::*;
 use rustc_hash::{FxHashMap as Map, FxHashSet as Set};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -76,22 +77,20 @@ impl<'a> Slit<'a> {
                 }
             }
         }
-        let source_area: FaceVec<f64> = connectivity
-            .faces()
-            .map(|f| triangle_area(mesh.face_positions(f)))
-            .collect();
-        let flat_area: FaceVec<f64> = connectivity
-            .faces()
-            .map(|f| flat_area(connectivity.face_edges(f).map(|e| length[e])))
-            .collect();
+        let faces = (0..connectivity.face_count()).into_par_iter();
+        let source = |f| triangle_area(mesh.face_positions(FaceId::new(f)));
+        let source_area: FaceVec<f64> = faces.clone().map(source).collect::<Vec<_>>().into();
+        let flat = |f| flat_area(connectivity.face_edges(FaceId::new(f)).map(|e| length[e]));
+        let flat_area: FaceVec<f64> = faces.map(flat).collect::<Vec<_>>().into();
         let log_scale = regional_log_scale(connectivity, &source_area, &flat_area);
-        let beside = connectivity.halfedges().map(|h| {
+        let halfedges = (0..connectivity.halfedge_count()).into_par_iter();
+        let beside = halfedges.map(HalfedgeId::new).map(|h| {
             let twin = connectivity.twin(h);
             let twin = twin.filter(|_| !cut.is_cut[connectivity.edge(h)]);
             twin.map_or(NONE, |t| connectivity.face(t).raw())
         });
         Slit {
-            beside: beside.collect(),
+            beside: beside.collect::<Vec<_>>().into(),
             connectivity,
             mesh,
             cut,

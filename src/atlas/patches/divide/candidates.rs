@@ -1,6 +1,6 @@
 //! Where a patch may be divided: along creases, by straight lines, and between less scale and more.
 
-use super::{Divider, Outline, highest};
+use super::{Divider, Outline, Scratch, highest};
 use crate::atlas::patches::demand::{Demand, Sums};
 use crate::atlas::patches::overlap::Triangle;
 use crate::atlas::patches::placement::{Placement, centroid, rounded_ln};
@@ -22,9 +22,63 @@ const CRUMB: f64 = 0.02;
 /// Thresholds of scale that are tried lie this far apart, or a little less.
 const SCALE_STEP: f64 = 0.5;
 
+/// A way to divide a patch.
+pub(super) enum Candidate {
+    /// Between creases.
+    Creases,
+    /// Before a line across strips, and behind it.
+    Line(Strips, usize),
+    /// Less scale than this, and more.
+    Scale(Scales, usize),
+}
+
 impl Divider<'_> {
+    /// Divisions that are worth a closer look.
+    pub(super) fn candidates(
+        &self,
+        faces: &[FaceId],
+        placement: &Placement,
+        outline: &Outline,
+    ) -> Vec<Candidate> {
+        let mut candidates = vec![Candidate::Creases];
+        candidates.extend(self.lines(faces, placement, outline));
+        candidates.extend(self.scale(faces, outline));
+        candidates
+    }
+
+    /// The connected parts of a candidate.
+    pub(super) fn connected(
+        &self,
+        candidate: &Candidate,
+        faces: &[FaceId],
+        placement: &Placement,
+        outline: &Outline,
+        scratch: &mut Scratch,
+    ) -> Vec<Vec<FaceId>> {
+        let slit = self.slit;
+        let Scratch { sets, label } = scratch;
+        let is_below: Vec<bool> = match candidate {
+            Candidate::Creases => {
+                let sides = self.by_creases(faces, sets, label);
+                return sides
+                    .iter()
+                    .flat_map(|side| sets.components(side))
+                    .collect();
+            }
+            Candidate::Line(strips, line) => {
+                let strip = |&f: &FaceId| strips.of(&placement.triangle(slit, f));
+                faces.iter().map(|f| strip(f) < *line).collect()
+            }
+            Candidate::Scale(scales, first) => {
+                let step = |&f: &FaceId| scales.step(slit.log_scale[f]);
+                faces.iter().map(|f| step(f) < *first).collect()
+            }
+        };
+        self.without_crumbs(faces, &is_below, &outline.demand.sums, sets)
+    }
+
     /// Parts between creases; crumbs belong to the part that is fewest faces away. None where creases enclose nothing large.
-    pub(super) fn by_creases(
+    fn by_creases(
         &self,
         faces: &[FaceId],
         sets: &mut Sets,
@@ -93,14 +147,13 @@ impl Divider<'_> {
         sides
     }
 
-    /// The sides of the lines that promise most, by the rectangles in their direction.
-    pub(super) fn by_lines(
+    /// The lines that promise most, by the rectangles in their direction.
+    fn lines(
         &self,
         faces: &[FaceId],
         placement: &Placement,
         outline: &Outline,
-        sets: &mut Sets,
-    ) -> Vec<Vec<Vec<FaceId>>> {
+    ) -> impl Iterator<Item = Candidate> + use<> {
         let slit = self.slit;
         // By their numbers, since their order changes with the last digits of scales.
         let every = faces.len() / SAMPLE + 1;
@@ -149,36 +202,26 @@ impl Divider<'_> {
         let mut seen = [false; DIRECTIONS];
         promised.retain(|&(_, direction, _)| !std::mem::replace(&mut seen[direction], true));
         promised.truncate(CANDIDATES);
-        let sides = promised.into_iter().map(|(_, direction, line)| {
-            let strips = &directions[direction];
-            let is_below = |&f: &FaceId| strips.of(&placement.triangle(slit, f)) < line;
-            let is_below = faces.iter().map(is_below);
-            let is_below: Vec<bool> = is_below.collect();
-            self.without_crumbs(faces, &is_below, &outline.demand.sums, sets)
-        });
-        sides.collect()
+        let line = move |(_, direction, line)| Candidate::Line(directions[direction], line);
+        promised.into_iter().map(line)
     }
 
-    /// Connected parts of less scale and of more, where they promise most if they fill their rectangles as the patch does: a texel is of one width in the
+    /// Where less scale and more promise most, if both fill their rectangles as the patch does: a texel is of one width in the
     /// plane, so where scale is least the surface is held worst.
-    pub(super) fn by_scale(
-        &self,
-        faces: &[FaceId],
-        outline: &Outline,
-        sets: &mut Sets,
-    ) -> Option<Vec<Vec<FaceId>>> {
+    fn scale(&self, faces: &[FaceId], outline: &Outline) -> Option<Candidate> {
         let slit = self.slit;
         let scales = faces.iter().map(|&f| slit.log_scale[f]);
         let lowest = scales.fold(f64::INFINITY, f64::min);
         let range = highest(slit, faces) - lowest;
         let steps = (range / SCALE_STEP).ceil().clamp(1.0, 64.0) as usize;
-        let step = |f: FaceId| {
-            let at = (slit.log_scale[f] - lowest) / range * steps as f64;
-            (at as usize).min(steps - 1)
+        let scales = Scales {
+            lowest,
+            range,
+            steps,
         };
         let mut rows = vec![Sums::default(); steps];
         for &f in faces {
-            let row = &mut rows[step(f)];
+            let row = &mut rows[scales.step(slit.log_scale[f])];
             *row = row.and(self.bends.of_face[f]);
         }
         let whole = outline.demand;
@@ -190,9 +233,7 @@ impl Divider<'_> {
         };
         let promise = |&first: &usize| rounded_ln(cost(&rows[..first]) + cost(&rows[first..]));
         let first = (1..steps).min_by_key(promise)?;
-        let is_below = faces.iter().map(|&f| step(f) < first);
-        let is_below: Vec<bool> = is_below.collect();
-        Some(self.without_crumbs(faces, &is_below, &whole.sums, sets))
+        Some(Candidate::Scale(scales, first))
     }
 
     /// Cost of the rows so far, for every number of rows.
@@ -243,8 +284,23 @@ impl Divider<'_> {
     }
 }
 
+/// Equal parts of a range of log scale.
+pub(super) struct Scales {
+    lowest: f64,
+    range: f64,
+    steps: usize,
+}
+
+impl Scales {
+    fn step(&self, scale: f64) -> usize {
+        let at = (scale - self.lowest) / self.range * self.steps as f64;
+        (at as usize).min(self.steps - 1)
+    }
+}
+
 /// Strips across an axis, one more than there are lines between them.
-struct Strips {
+#[derive(Clone, Copy)]
+pub(super) struct Strips {
     axis: [f64; 2],
     /// Where the first one begins, and what all measure.
     low: f64,

@@ -12,6 +12,7 @@ use super::tableau::Limits;
 use crate::flow::solve::{LANES, Row};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::mesh::Mesh;
+use rayon::prelude::*;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -227,16 +228,27 @@ impl<'a> Placement<'a> {
         let mut new: Vec<usize> = new.collect();
         // Neighbours in the order of elimination have most of the way to its end in common.
         new.sort_unstable_by_key(|&v| self.picture.position[v]);
-        for vertices in new.chunks(LANES) {
-            let mut known = self.spare.pop().unwrap_or_default();
-            known.vertices = vertices.to_vec();
-            self.picture.columns(vertices, &mut known.columns);
-            self.picture
-                .sums(&known.columns, &self.samples, &mut known.sums);
-            take(&known);
-            match (self.known.len() + 1) * known.columns.len() <= KNOWN / LANES {
-                true => self.known.push(known),
-                false => self.spare.push(known),
+        let groups: Vec<&[usize]> = new.chunks(LANES).collect();
+        // As many at a time as there are threads, unless they are large.
+        let rows = self.picture.order.len().max(1);
+        let most = (KNOWN / LANES / rows).clamp(1, rayon::current_num_threads());
+        for groups in groups.chunks(most) {
+            let fresh = groups.iter().map(|vertices| Known {
+                vertices: vertices.to_vec(),
+                ..self.spare.pop().unwrap_or_default()
+            });
+            let mut fresh: Vec<Known> = fresh.collect();
+            let (picture, samples) = (&self.picture, &self.samples);
+            fresh.par_iter_mut().with_max_len(1).for_each(|known| {
+                picture.columns(&known.vertices, &mut known.columns);
+                picture.sums(&known.columns, samples, &mut known.sums);
+            });
+            for known in fresh {
+                take(&known);
+                match (self.known.len() + 1) * known.columns.len() <= KNOWN / LANES {
+                    true => self.known.push(known),
+                    false => self.spare.push(known),
+                }
             }
         }
         Answers {
