@@ -24,6 +24,7 @@ use super::slit::Slit;
 use crate::atlas::plane::wrap_angle;
 use crate::geometry::ids::{FaceId, FaceVec};
 use crate::parallel;
+use candidates::Candidate;
 use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::sync::{Mutex, PoisonError};
@@ -186,9 +187,11 @@ impl<'a> Divider<'a> {
 
     /// How patches are best divided.
     fn best_divisions(&self, patches: Vec<Vec<FaceId>>) -> Vec<Row> {
+        // Of many, each is worked out by one thread: one that waits for others would begin the next, in a space more.
+        let are_few = patches.len() < 2 * rayon::current_num_threads();
         let rows = patches.into_par_iter().with_max_len(1);
         rows.map(|faces| {
-            let division = self.with_own(|own| self.best_division(&faces, own));
+            let division = self.with_own(|own| self.best_division(&faces, own, are_few));
             Row { faces, division }
         })
         .collect()
@@ -214,8 +217,13 @@ impl<'a> Divider<'a> {
         place(slit, border.iter().copied(), root, highest, member, own)
     }
 
-    /// How a patch is best divided.
-    fn best_division(&self, faces: &[FaceId], own: &mut [[f64; 2]]) -> Option<Division> {
+    /// How a patch is best divided; `side_by_side`: whether candidates are worked out by several threads.
+    fn best_division(
+        &self,
+        faces: &[FaceId],
+        own: &mut [[f64; 2]],
+        side_by_side: bool,
+    ) -> Option<Division> {
         let slit = self.slit;
         let (placement, outline) = self.with_sets(|sets| {
             let (sums, border) = self.sums_and_border(faces, sets);
@@ -225,12 +233,16 @@ impl<'a> Divider<'a> {
         });
         let now = self.cost(&outline.demand);
         let tried = self.candidates(faces, &placement, &outline);
-        let found = parallel::map(&tried, |_, candidate| {
+        let division = |candidate: &Candidate| {
             self.with_scratch(|scratch| {
                 let parts = self.connected(candidate, faces, &placement, &outline, scratch);
                 self.in_parts(parts, now, &placement, &mut scratch.sets)
             })
-        });
+        };
+        let found = match side_by_side {
+            true => parallel::map(&tried, |_, candidate| division(candidate)),
+            false => tried.iter().map(division).collect(),
+        };
         let mut found: Vec<(i64, Division)> = (found.into_iter().flatten())
             .map(|division| {
                 let share = division.saved / now.max(f64::MIN_POSITIVE);
@@ -247,8 +259,11 @@ impl<'a> Divider<'a> {
             self.with_sets(|sets| part.is_injective(sets, faces))
         };
         found.find(|division| {
-            let parts = division.parts.par_iter().zip(&division.borders);
-            parts.with_max_len(1).all(is_injective)
+            let (parts, borders) = (&division.parts, &division.borders);
+            match side_by_side {
+                true => (parts.par_iter().zip(borders).with_max_len(1)).all(is_injective),
+                false => parts.iter().zip(borders).all(is_injective),
+            }
         })
     }
 
