@@ -39,9 +39,9 @@ const SOME: usize = 12;
 /// Numbers of cells beside the default.
 const OTHER_CELLS: [&str; 3] = ["grid.cells=200", "grid.cells=500", "grid.cells=8000"];
 
-/// Most Newton steps to a seamless metric, and the largest standard deviation of its log scale; measured: 3 to 15, 0.03 to 0.09.
+/// Most Newton steps to a seamless metric, and the largest standard deviation of its log scale; measured: 2 to 15, 0.03 to 0.09, and 0.16 on the punctured torus, whose scales a conformality of 0.1 makes less even than 0 did (0.124).
 const SEAMLESS_STEPS: u64 = 15;
-const SEAMLESS_STD: f64 = 0.13;
+const SEAMLESS_STD: f64 = 0.17;
 
 /// Part of the length of sharp edges that must lie on lines.
 const LEAST_ON_LINES: f64 = 0.95;
