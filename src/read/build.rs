@@ -4,10 +4,24 @@ use super::ReadParams;
 use super::budget::Budget;
 use super::error::{Place, ReadProblem, shorten};
 use crate::geometry::ids::NONE;
-use crate::geometry::mesh::{AttributeKind, CornerAttribute, Part, Soup};
+use crate::geometry::mesh::{AttributeKind, CornerAttribute, EmbeddedImage, Part, Soup};
 
 /// Notes beyond this number say nothing new.
 const MAX_NOTES: usize = 64;
+
+/// What kind of image it is that glTF does not know.
+fn kind_of(bytes: &[u8]) -> String {
+    let kind = match bytes {
+        [b'B', b'M', ..] => "BMP",
+        [b'G', b'I', b'F', b'8', ..] => "GIF",
+        [b'R', b'I', b'F', b'F', ..] => "WebP",
+        [b'I', b'I', b'*', 0, ..] | [b'M', b'M', 0, b'*', ..] => "TIFF",
+        [b'D', b'D', b'S', b' ', ..] => "DDS",
+        [b'v', b'/', b'1', 1, ..] => "OpenEXR",
+        _ => return "neither PNG nor JPEG: convert it to PNG".into(),
+    };
+    format!("{kind}, not PNG or JPEG: convert it to PNG")
+}
 
 /// Collects vertices, triangles and attributes; refuses what exceeds the limits.
 pub(super) struct SoupBuilder {
@@ -91,6 +105,35 @@ impl SoupBuilder {
             MAX_NOTES => "there is more to note than is listed here".into(),
             _ => note,
         });
+    }
+
+    /// An image file; none, with a note, where it is of a kind that glTF does not know: the surface does not depend on it.
+    pub fn image(
+        &mut self,
+        bytes: &[u8],
+        what: impl Fn() -> String,
+    ) -> Result<Option<EmbeddedImage>, ReadProblem> {
+        // The bytes decide: declared types and names are often wrong.
+        let mime_type = match bytes {
+            [0x89, b'P', b'N', b'G', ..] => "image/png",
+            [0xff, 0xd8, 0xff, ..] => "image/jpeg",
+            other => {
+                let note = format!("{} is skipped: {}", what(), kind_of(other));
+                self.note(note);
+                return Ok(None);
+            }
+        };
+        let has_end = bytes.windows(4).rev().any(|name| name == b"IEND");
+        if mime_type == "image/png" && !has_end {
+            let note = format!("{} is skipped: it is cut off", what());
+            self.note(note);
+            return Ok(None);
+        }
+        self.budget.unpack(bytes.len() as u64, what)?;
+        Ok(Some(EmbeddedImage {
+            mime_type: mime_type.into(),
+            bytes: bytes.to_vec(),
+        }))
     }
 
     /// Begins a part here; it ends where the next begins.

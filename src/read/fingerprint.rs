@@ -1,15 +1,15 @@
 //! A hash over a mesh file and every file that it refers to, without decoding any of them.
 //!
 //! *Enters:* a path. *Leaves:* a [`Fingerprint`] that changes when a byte of the file changes, or a byte of a buffer or image that a glTF
-//! file names, or one of those appears or disappears. The main file alone decides which others are named, so two equal
-//! fingerprints mean that [`read`](super::read()) meets the same bytes.
-//! Memory is bounded by the JSON of a glTF file; everything else streams through the hash.
+//! file names, of a material library that an OBJ file names or of an image that this one names, or one of those appears or disappears. Only files that are hashed decide which
+//! others are named, so two equal fingerprints mean that [`read`](super::read()) meets the same bytes.
+//! Memory is bounded by the JSON of a glTF file and by material libraries; everything else streams through the hash.
 
 use super::bounded::open_regular;
-use super::{Format, format_of, gltf};
+use super::{Format, folder, format_of, gltf, mtl};
 use std::collections::BTreeSet;
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 /// What was found; see the module docs.
@@ -31,19 +31,20 @@ pub fn fingerprint(path: &Path) -> io::Result<Fingerprint> {
     let (mut file, _) = open_regular(path)?;
     let (hash, mut bytes) = hash_of(&mut file)?;
     let mut files = vec![path.to_owned()];
+    let shown = path.parent().unwrap_or(Path::new(""));
+    let folder = match shown.as_os_str().is_empty() {
+        true => Path::new(".").canonicalize()?,
+        false => shown.canonicalize()?,
+    };
     let named = match format_of(path) {
         Ok(Format::Gltf) => named_in(&mut file)?,
+        Ok(Format::Obj) => named_in_obj(&mut file, &folder)?,
         _ => BTreeSet::new(),
     };
     if named.is_empty() {
         let hash = hash.to_hex().to_string();
         return Ok(Fingerprint { hash, bytes, files });
     }
-    let shown = path.parent().unwrap_or(Path::new(""));
-    let folder = match shown.as_os_str().is_empty() {
-        true => Path::new(".").canonicalize()?,
-        false => shown.canonicalize()?,
-    };
     let mut all = blake3::Hasher::new();
     all.update(hash.as_bytes());
     for name in &named {
@@ -71,13 +72,36 @@ fn hash_of(file: &mut File) -> io::Result<(blake3::Hash, u64)> {
     Ok((hasher.finalize(), hasher.count()))
 }
 
-/// Hash and length of a file in a folder, links followed.
-fn referenced(folder: &Path, name: &str) -> io::Result<(blake3::Hash, u64)> {
-    let path = folder.join(name).canonicalize()?;
+/// A file in a folder, links followed.
+fn open_in(folder: &Path, name: &str) -> io::Result<File> {
+    let path = folder::find(folder, name)?;
     if !path.starts_with(folder) {
         return Err(io::ErrorKind::NotFound.into());
     }
-    hash_of(&mut open_regular(&path)?.0)
+    Ok(open_regular(&path)?.0)
+}
+
+/// Hash and length of a file in a folder.
+fn referenced(folder: &Path, name: &str) -> io::Result<(blake3::Hash, u64)> {
+    hash_of(&mut open_in(folder, name)?)
+}
+
+/// The material libraries that an OBJ file names, and the images that they name.
+fn named_in_obj(file: &mut File, folder: &Path) -> io::Result<BTreeSet<String>> {
+    file.seek(SeekFrom::Start(0))?;
+    let mut named = BTreeSet::new();
+    for name in mtl::libraries(BufReader::new(file))? {
+        for library in mtl::library_files(&name) {
+            let mut bytes = Vec::new();
+            let read = open_in(folder, &library)
+                .and_then(|file| file.take(mtl::LARGEST + 1).read_to_end(&mut bytes));
+            if read.is_ok() && bytes.len() as u64 <= mtl::LARGEST {
+                named.extend(mtl::texture_files(&library, &bytes));
+            }
+            named.insert(library);
+        }
+    }
+    Ok(named)
 }
 
 /// The files that a glTF or GLB file names. One whose JSON is broken names none: reading it is refused.

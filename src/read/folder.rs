@@ -4,10 +4,44 @@ use super::bounded::open_regular;
 use super::budget::Budget;
 use super::error::{ReadProblem, shorten};
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::fs;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
+
+/// Whether a path is relative and stays inside its folder, in plain names.
+pub(super) fn is_inside(path: &str) -> bool {
+    // `file:`, `http:` and drive letters; a colon after the first slash is part of a name.
+    let first = path.split('/').next().unwrap_or_default();
+    let is_plain = !path.is_empty() && !path.contains(['\0', '\\']);
+    is_plain
+        && !first.contains(':')
+        && !path.starts_with('/')
+        && path.split('/').all(|part| part != "..")
+}
+
+/// The file of a path in a folder, links followed. Where there is none, one whose name differs in upper and lower case only, the first in order: files come from systems that see
+/// no difference.
+pub(super) fn find(folder: &Path, path: &str) -> io::Result<PathBuf> {
+    let missing = match folder.join(path).canonicalize() {
+        Ok(found) => return Ok(found),
+        Err(error) => error,
+    };
+    let mut found = folder.to_owned();
+    for name in path.split('/') {
+        let same =
+            |other: &OsStr| other.to_str().map(str::to_lowercase) == Some(name.to_lowercase());
+        let entries = fs::read_dir(&found)?
+            .flatten()
+            .map(|entry| entry.file_name());
+        match entries.filter(|other| same(other)).min() {
+            Some(other) => found.push(other),
+            None => return Err(missing),
+        }
+    }
+    found.canonicalize()
+}
 
 /// The files of one asset, read within bounds and hashed.
 pub(super) struct Folder {
@@ -73,7 +107,7 @@ impl Folder {
             let reason = "an asset in memory has no folder";
             referenced(io::Error::new(io::ErrorKind::NotFound, reason))
         })?;
-        let resolved = fs::canonicalize(root.join(path)).map_err(referenced)?;
+        let resolved = find(root, path).map_err(referenced)?;
         if !resolved.starts_with(root) {
             return Err(outside());
         }

@@ -18,6 +18,7 @@
 //! | `build` | the soup under construction and its limits |
 //! | `text` | lines, tokens and numbers of text formats |
 //! | `obj`, `off`, `ply`, `stl` | one format each |
+//! | `mtl` | material libraries of OBJ files |
 //! | `gltf` | glTF 2.0 and GLB with its compression extensions |
 //! | `atlas` | images and seams of a folder that a build wrote |
 //! | `gridded` | grid coordinates and patches of such a folder |
@@ -38,6 +39,7 @@ mod folder;
 mod gltf;
 pub mod gridded;
 pub mod metric;
+mod mtl;
 pub(crate) mod npz;
 mod obj;
 mod off;
@@ -165,7 +167,7 @@ fn parse(
     mut build: SoupBuilder,
 ) -> Result<SourceAsset, ReadProblem> {
     match format {
-        Format::Obj => obj::read_obj(bytes, &mut build)?,
+        Format::Obj => obj::read_obj(bytes, &mut folder, &mut build)?,
         Format::Off => off::read_off(bytes, &mut build)?,
         Format::Ply => ply::read_ply(bytes, &mut build)?,
         Format::Stl => stl::read_stl(bytes, &mut build)?,

@@ -1,13 +1,15 @@
 //! Wavefront OBJ: polygons with shared positions, texture coordinates and normals.
 //!
-//! Every `v` is a vertex, in file order and also where no face uses it. Of
-//! materials only the names are kept, of `v` weights nothing (they concern curves).
+//! Every `v` is a vertex, in file order and also where no face uses it. Materials get their colours and
+//! textures from the libraries ([`mtl`](super::mtl)); of `v` weights nothing is kept (they concern curves).
 //! Colours written after positions, as many programs do, are kept as they are where every vertex has one.
 
 use super::build::SoupBuilder;
 use super::error::{Place, ReadProblem, shorten};
+use super::folder::Folder;
+use super::mtl;
 use super::polygon::triangulate;
-use super::text::{Lines, integer, number, words};
+use super::text::{Lines, after_keyword, integer, number, words};
 use crate::geometry::ids::NONE;
 use crate::geometry::mesh::{AttributeKind, Material};
 use std::borrow::Cow;
@@ -37,8 +39,12 @@ struct Obj {
     polygon: Vec<[u32; 3]>,
 }
 
-/// Reads an OBJ file.
-pub(super) fn read_obj(bytes: &[u8], build: &mut SoupBuilder) -> Result<(), ReadProblem> {
+/// Reads an OBJ file and its material libraries.
+pub(super) fn read_obj(
+    bytes: &[u8],
+    folder: &mut Folder,
+    build: &mut SoupBuilder,
+) -> Result<(), ReadProblem> {
     let mut obj = Obj::default();
     let mut lines = Lines::new(bytes);
     build.part(String::new());
@@ -56,7 +62,8 @@ pub(super) fn read_obj(bytes: &[u8], build: &mut SoupBuilder) -> Result<(), Read
         }
         obj.line(&line, place, build)?;
     }
-    obj.finish(build)
+    obj.finish(build)?;
+    mtl::describe(bytes, folder, build)
 }
 
 impl Obj {
@@ -83,12 +90,12 @@ impl Obj {
             }
             Some(b"f") => self.face(words, place, build),
             Some(b"o" | b"g") => {
-                build.part(name(line));
+                build.part(after_keyword(line));
                 Ok(())
             }
-            Some(b"usemtl") => {
+            Some(word) if word.eq_ignore_ascii_case(b"usemtl") => {
                 let next = self.materials.len() as u32;
-                let name = name(line);
+                let name = after_keyword(line);
                 let id = *self
                     .materials
                     .entry(name.clone().into_bytes())
@@ -102,15 +109,12 @@ impl Obj {
                 self.material = Some(id);
                 Ok(())
             }
-            Some(b"mtllib") => {
-                build.note("material libraries are not read: materials keep their names only");
-                Ok(())
-            }
             Some(b"p" | b"l") => {
                 build.note("points and lines (`p`, `l`) are skipped");
                 Ok(())
             }
             None | Some(b"s") => Ok(()),
+            Some(word) if word.eq_ignore_ascii_case(b"mtllib") => Ok(()),
             Some(other) => {
                 build.note(format!(
                     "lines that begin with `{}` are skipped",
@@ -313,12 +317,4 @@ fn normal<'a>(
         *value = number(word, place)? as f32;
     }
     Ok(values)
-}
-
-/// What follows the keyword, blanks included.
-fn name(line: &[u8]) -> String {
-    let line = line.trim_ascii();
-    let start = line.iter().position(|b| b.is_ascii_whitespace());
-    let name = start.map_or(&[][..], |start| line[start..].trim_ascii());
-    String::from_utf8_lossy(name).into_owned()
 }

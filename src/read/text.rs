@@ -48,6 +48,14 @@ pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
         .take_while(|word| word[0] != b'#')
 }
 
+/// What follows the keyword, blanks included.
+pub(super) fn after_keyword(line: &[u8]) -> String {
+    let line = line.trim_ascii();
+    let start = line.iter().position(|b| b.is_ascii_whitespace());
+    let name = start.map_or(&[][..], |start| line[start..].trim_ascii());
+    String::from_utf8_lossy(name).into_owned()
+}
+
 /// A number in full precision. `nan` and `inf` are numbers here; who needs finite ones says so.
 pub(super) fn number(word: &[u8], place: Place) -> Result<f64, ReadProblem> {
     let parsed = std::str::from_utf8(word).ok().and_then(|w| w.parse().ok());

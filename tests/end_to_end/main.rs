@@ -17,6 +17,7 @@ mod grids;
 mod hard;
 #[cfg(unix)]
 mod interrupt;
+mod materials;
 mod packed;
 mod prescriptions;
 mod profile;

@@ -5,9 +5,9 @@
 
 use super::buffers::{Buffers, load_uri, lookup};
 use super::schema::{Root, TextureInfo, TextureTransform};
-use crate::geometry::mesh::{Appearance, EmbeddedImage, Material, Texture, TextureUse};
+use crate::geometry::mesh::{Appearance, Material, Texture, TextureUse};
 use crate::read::build::SoupBuilder;
-use crate::read::error::{ReadProblem, shorten};
+use crate::read::error::ReadProblem;
 use crate::read::folder::Folder;
 use std::collections::BTreeMap;
 
@@ -223,23 +223,10 @@ impl<'a> Gather<'a, '_> {
             },
             Source::View(view) => self.buffers.view(view, what)?,
         };
-        // The bytes decide: declared types are often wrong.
-        let mime_type = match bytes {
-            [0x89, b'P', b'N', b'G', ..] => "image/png",
-            [0xff, 0xd8, 0xff, ..] => "image/jpeg",
-            other => {
-                let start = shorten(&other[..other.len().min(8)]);
-                self.build.note(format!(
-                    "image {index} is skipped: neither PNG nor JPEG (it begins with `{start}`)"
-                ));
-                return Ok(None);
-            }
-        };
-        budget.unpack(bytes.len() as u64, what)?;
-        self.appearance.images.push(EmbeddedImage {
-            mime_type: mime_type.into(),
-            bytes: bytes.to_vec(),
-        });
-        Ok(Some(self.appearance.images.len() - 1))
+        let image = self.build.image(bytes, what)?;
+        Ok(image.map(|image| {
+            self.appearance.images.push(image);
+            self.appearance.images.len() - 1
+        }))
     }
 }

@@ -1,6 +1,7 @@
 //! Data URIs and percent-encoding (RFC 2397, 3986, 4648).
 
 use crate::read::error::{ReadProblem, shorten};
+use crate::read::folder::is_inside;
 
 fn bad(uri: &str) -> ReadProblem {
     ReadProblem::BadUri {
@@ -74,13 +75,7 @@ pub fn relative_path(uri: &str) -> Result<String, ReadProblem> {
     if path.is_empty() || path.contains('\0') {
         return Err(bad(uri));
     }
-    // `file:`, `http:` and drive letters; a colon after the first slash is part of a name.
-    let first = path.split('/').next().unwrap_or_default();
-    let outside = first.contains(':')
-        || path.starts_with('/')
-        || path.contains('\\')
-        || path.split('/').any(|part| part == "..");
-    if outside {
+    if !is_inside(&path) {
         return Err(ReadProblem::OutsideFolder {
             uri: shorten(uri.as_bytes()),
         });

@@ -1416,7 +1416,8 @@ fn meshopt_compressed_views() {
 
 // ---- appearance
 
-const PNG: [u8; 8] = [0x89, b'P', b'N', b'G', 13, 10, 26, 10];
+/// How a PNG begins, and the name of its last part.
+const PNG: [u8; 12] = *b"\x89PNG\r\n\x1a\nIEND";
 const JPEG: [u8; 4] = [0xff, 0xd8, 0xff, 0xe0];
 
 #[test]
