@@ -33,8 +33,11 @@ fn spread(count: usize, each: &(dyn Fn(usize) + Sync)) {
     (0..count).into_par_iter().for_each(each);
 }
 
-/// Bytes of stack of a thread beside the pool: as many as the first one of a program mostly has.
+/// Bytes of stack of a thread: as many as the first one of a program mostly has.
 const STACK: usize = 8 << 20;
+
+/// From so many items for each thread on, none needs the others' help with one of its own.
+const MANY: usize = 4;
 
 thread_local! {
     static NUMBER: Cell<usize> = const { Cell::new(0) };
@@ -42,11 +45,19 @@ thread_local! {
 
 /// The number of this thread: 0 for the first, from 1 for those of the pool, and then those of [`beside`].
 pub(crate) fn thread_number() -> usize {
-    rayon::current_thread_index().map_or_else(|| NUMBER.get(), |i| i + 1)
+    match NUMBER.get() {
+        0 => rayon::current_thread_index().map_or(0, |i| i + 1),
+        number => number,
+    }
+}
+
+/// `f` in a thread of the pool, which can share out its parts without a thread being woken for each.
+pub(crate) fn inside<T: Send>(f: impl FnOnce() -> T + Send) -> T {
+    rayon::scope(|_| f())
 }
 
 /// `f` of each item, in order, for long work that uses the pool itself: on as many threads beside the pool as that has. A thread of the pool that waits for
-/// others would begin the next item meanwhile, and its stack would hold many.
+/// others would begin the next item meanwhile, and its stack would hold many. Where there are many items, each thread does all of one by itself.
 pub(crate) fn beside<I: Send, T: Send>(items: Vec<I>, f: impl Fn(I) -> T + Sync) -> Vec<T> {
     let threads = rayon::current_num_threads().min(items.len());
     if threads < 2 {
@@ -66,11 +77,25 @@ pub(crate) fn beside<I: Send, T: Send>(items: Vec<I>, f: impl Fn(I) -> T + Sync)
             *results[i].lock().unwrap_or_else(PoisonError::into_inner) = result;
         }
     };
+    let work_as = |number: usize| {
+        let alone = rayon::ThreadPoolBuilder::new()
+            .num_threads(1)
+            .stack_size(STACK)
+            .start_handler(move |_| NUMBER.set(number));
+        let alone = (count >= MANY * threads)
+            .then(|| alone.build().ok())
+            .flatten();
+        match alone {
+            Some(alone) => alone.install(work),
+            None => work(),
+        }
+    };
+    let work_as = &work_as;
     thread::scope(|scope| {
         let others = (1..threads).map(|k| {
             let numbered = move || {
                 NUMBER.set(first + k);
-                work();
+                work_as(first + k);
             };
             thread::Builder::new()
                 .stack_size(STACK)
@@ -78,7 +103,7 @@ pub(crate) fn beside<I: Send, T: Send>(items: Vec<I>, f: impl Fn(I) -> T + Sync)
         });
         // Where the system has no more threads, there are fewer.
         let others: Vec<_> = others.flatten().collect();
-        work();
+        work_as(first);
         for other in others {
             if let Err(panic) = other.join() {
                 std::panic::resume_unwind(panic);

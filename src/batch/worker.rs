@@ -160,7 +160,8 @@ pub fn work(job: &Job, path: &Path, output: &Path) -> AssetOutcome {
     config.cones.file_lines.clone_from(&job.cone_lines);
     let before = read::fingerprint(path).ok();
     let told = Told::new(job);
-    let mut outcome = job::run(path, &job.given, output, &job.id, &config, &told);
+    let run = || job::run(path, &job.given, output, &job.id, &config, &told);
+    let mut outcome = parallel::inside(run);
     while ENDING.load(Ordering::SeqCst) {
         // What failed may have failed because its files were removed. The lifeline ends this process.
         std::thread::park();
@@ -184,12 +185,20 @@ pub fn work(job: &Job, path: &Path, output: &Path) -> AssetOutcome {
     outcome
 }
 
+/// Of an asset of more components not every stage is told, which would take as long as the stages themselves.
+const FEW: usize = 16;
+
+/// At least that long passes between two of its stages that are told.
+const INTERVAL: Duration = Duration::from_millis(50);
+
 /// Passes on what the job tells, and logs how long each stage took.
 struct Told<'j> {
     job: &'j Job,
     /// The stage of each component that is under way.
     stage: Mutex<BTreeMap<usize, (&'static str, SystemTime, Instant)>>,
     step: Mutex<Option<Instant>>,
+    /// When a stage was told last.
+    heard: Mutex<Option<Instant>>,
 }
 
 impl<'j> Told<'j> {
@@ -198,6 +207,7 @@ impl<'j> Told<'j> {
             job,
             stage: Mutex::default(),
             step: Mutex::default(),
+            heard: Mutex::default(),
         }
     }
 
@@ -238,6 +248,13 @@ impl Observer for Told<'_> {
         let mut stages = self.stage.lock().unwrap_or_else(PoisonError::into_inner);
         stages.insert(component, (name, SystemTime::now(), Instant::now()));
         drop(stages);
+        if components > FEW {
+            let mut heard = self.heard.lock().unwrap_or_else(PoisonError::into_inner);
+            if heard.is_some_and(|heard| heard.elapsed() < INTERVAL) {
+                return;
+            }
+            *heard = Some(Instant::now());
+        }
         send(&Event::Stage {
             name: name.to_owned(),
             component,

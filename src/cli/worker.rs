@@ -9,6 +9,9 @@ use affine_atlas::outcome::{AssetOutcome, Failure, FailureKind};
 use std::process::ExitCode;
 use std::time::Instant;
 
+/// Bytes of stack of a thread: as many as the first one of a program mostly has.
+const STACK: usize = 8 << 20;
+
 /// Does one job and says what became of it. A panic is the mesh's failure like any other.
 pub fn run(arguments: &Worker, work: &Work) -> ExitCode {
     let start = Instant::now();
@@ -71,7 +74,8 @@ fn log_end(outcome: &AssetOutcome) {
 
 fn threads(job: &Job) -> Result<(), Failure> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(job.threads.max(1));
-    pool.build_global().map_err(|error| Failure {
+    // The job runs in one of them.
+    pool.stack_size(STACK).build_global().map_err(|error| Failure {
         kind: match job.memory {
             0 => FailureKind::Internal,
             _ => FailureKind::Memory,

@@ -245,7 +245,7 @@ pub const KEYS: &[Key] = &[
             max: 1_000_000,
         },
         "components",
-        "1000",
+        "20000",
     ),
     key(
         "cones.strategy",

@@ -41,6 +41,11 @@ const COARSEST: f64 = 1.0 / (1 << 22) as f64;
 /// A mesh that was this many times as long as what faces without area leave of it has lost its extent.
 const LOST: f64 = 1e3;
 
+/// Components of fewer faces, as a mean, are what is left of a soup.
+const LOOSE: usize = 3;
+/// Of those so many times fewer are allowed.
+const FEWER: usize = 20;
+
 /// What repair may do.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -52,8 +57,8 @@ pub struct RepairParams {
     pub weld_tolerance: f64,
     /// Refuse where anything but unused vertices would change, instead of changing it.
     pub strict: bool,
-    /// Most components (each becomes an atlas of its own), at least 1. More are a sign of input that no repair helps:
-    /// a soup that does not weld, or the cells of a volume mesh.
+    /// Most components (each becomes an atlas of its own), at least 1; a twentieth of it where they are fragments: less than three faces each, as those of a soup
+    /// that does not weld, or as many cut edges as components, as between the cells of a volume mesh.
     pub max_components: usize,
 }
 
@@ -63,7 +68,7 @@ impl Default for RepairParams {
             weld: true,
             weld_tolerance: 0.0,
             strict: false,
-            max_components: 1000,
+            max_components: 20_000,
         }
     }
 }
@@ -169,13 +174,23 @@ pub enum RepairError {
     },
     /// The surface falls apart.
     #[error(
-        "the repaired surface falls into {components} components, more than repair.max_components = {most}; repair found: {summary}; weld the mesh or take out inner walls, or raise the limit"
+        "the repaired surface falls into {components} components, more than {}; repair found: {summary}; weld the mesh or take out inner walls, or set repair.max_components = {}",
+        match fragments {
+            Some(why) => format!("a twentieth of repair.max_components = {most} ({why})"),
+            None => format!("repair.max_components = {most}"),
+        },
+        match fragments {
+            Some(_) => components * FEWER,
+            None => *components,
+        }
     )]
     TooManyComponents {
         /// Components.
         components: usize,
         /// Allowed.
         most: usize,
+        /// Why they are taken for fragments, of which fewer are allowed.
+        fragments: Option<&'static str>,
         /// Counts of what repair changed.
         summary: String,
     },
@@ -272,10 +287,26 @@ pub fn repair(soup: &Soup, params: &RepairParams) -> Result<Repaired, RepairErro
     check_extent(&positions, &soup.faces, &draft, &frame)?;
     let gluing = glue::glue(&draft, &positions, &mut changes);
     let repaired = assemble::assemble(soup, &stands_for, &draft, &gluing, changes);
-    if repaired.components.len() > params.max_components {
+    let components = repaired.components.len();
+    let cuts = repaired.log.counts().get("cut_edges").copied();
+    let fragments = if draft.len() < LOOSE * components {
+        Some("they have less than three faces each")
+    } else if cuts.is_some_and(|cuts| cuts >= components as u64) {
+        Some(
+            "they are cut apart at edges of more than two faces, as the cells of a volume mesh are",
+        )
+    } else {
+        None
+    };
+    let most = match fragments {
+        Some(_) => (params.max_components / FEWER).max(1),
+        None => params.max_components,
+    };
+    if components > most {
         return Err(RepairError::TooManyComponents {
-            components: repaired.components.len(),
+            components,
             most: params.max_components,
+            fragments,
             summary: repaired.log.summary(),
         });
     }

@@ -9,6 +9,7 @@
 //! *Not guaranteed:* that two runs which write the same asset at the same time see each other; the
 //! later one wins, whole.
 
+mod syncing;
 mod unfinished;
 
 pub use crate::export::names::component_name;
@@ -22,6 +23,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Component, Path, PathBuf};
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
+use syncing::Syncing;
 use unfinished::{process_is_gone, remove_folder, replace, staging_name, sweep, unfinished_name};
 
 /// Removes the staging folders of this process and refuses every further write, for the handler of
@@ -119,6 +121,7 @@ pub struct Staging {
     output_root: PathBuf,
     target: PathBuf,
     path: PathBuf,
+    syncing: Syncing,
 }
 
 impl Staging {
@@ -164,6 +167,7 @@ impl Staging {
             output_root: output_root.to_owned(),
             target,
             path,
+            syncing: Syncing::default(),
         })
     }
 
@@ -178,7 +182,7 @@ impl Staging {
     }
 
     /// Opens a new file; folders on the way (`images/`) are made. `relative` uses forward slashes.
-    pub fn create(&self, relative: &str) -> Result<StagedFile, ExportError> {
+    pub fn create(&self, relative: &str) -> Result<StagedFile<'_>, ExportError> {
         let path = self.inside(relative)?;
         // Under the lock, so that nothing is made again after Ctrl-C removed everything.
         let _state = self.registry.lock_open()?;
@@ -189,6 +193,7 @@ impl Staging {
         Ok(StagedFile {
             shown: self.target.join(relative),
             file: BufWriter::new(file),
+            syncing: &self.syncing,
         })
     }
 
@@ -234,6 +239,7 @@ impl Staging {
 
     /// Puts the folder in place. On an error the older folder is where it was.
     pub fn publish(self) -> Result<(), ExportError> {
+        self.syncing.wait()?;
         sync_folders(&self.path).map_err(ExportError::io(Action::Publish, &self.target))?;
         {
             let _state = self.registry.lock_open()?;
@@ -269,27 +275,33 @@ impl Drop for Staging {
 }
 
 /// A file in a staging folder. Call [`StagedFile::finish`]: dropping it may lose an error.
-pub struct StagedFile {
+pub struct StagedFile<'a> {
     shown: PathBuf,
     file: BufWriter<File>,
+    syncing: &'a Syncing,
 }
 
-impl StagedFile {
+impl StagedFile<'_> {
     /// Where the file will be once its folder is in place; what error messages name.
     pub fn path(&self) -> &Path {
         &self.shown
     }
 
-    /// Writes what is buffered and waits until the disk has it.
-    pub fn finish(mut self) -> Result<(), ExportError> {
-        self.file
-            .flush()
-            .and_then(|()| self.file.get_ref().sync_all())
-            .map_err(ExportError::io(Action::Write, &self.shown))
+    /// Writes what is buffered. [`Staging::publish`] waits until the disk has it.
+    pub fn finish(self) -> Result<(), ExportError> {
+        let Self {
+            shown,
+            file,
+            syncing,
+        } = self;
+        match file.into_inner() {
+            Ok(file) => syncing.sync(file, shown),
+            Err(error) => Err(ExportError::io(Action::Write, &shown)(error.into_error())),
+        }
     }
 }
 
-impl Write for StagedFile {
+impl Write for StagedFile<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.file.write(bytes)
     }
@@ -298,7 +310,7 @@ impl Write for StagedFile {
     }
 }
 
-impl Seek for StagedFile {
+impl Seek for StagedFile<'_> {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.file.seek(to)
     }
