@@ -17,7 +17,11 @@ use crate::read::EXTENSIONS;
 use crate::read::bounded::read_bounded;
 use std::collections::HashSet;
 use std::fs;
+use std::io::Read;
 use std::path::{Component, Path, PathBuf};
+
+/// Bytes at the start of `atlas.json` that say whose it is.
+const START: u64 = 256;
 
 /// What the entries mean.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -190,7 +194,16 @@ impl Search {
                     continue;
                 }
             };
-            for entry in entries.flatten() {
+            let entries: Vec<fs::DirEntry> = entries.flatten().collect();
+            if entries.iter().any(is_result) {
+                let note = format!(
+                    "{} holds results of affine-atlas: nothing in it is built",
+                    folder.display()
+                );
+                self.inputs.notes.push(note);
+                continue;
+            }
+            for entry in entries {
                 let name = entry.file_name();
                 if name.to_string_lossy().starts_with('.') {
                     continue;
@@ -275,6 +288,20 @@ impl Search {
         };
         self.output.as_ref().is_some_and(inside)
     }
+}
+
+/// Whether an entry of a folder is found in those only that this program writes.
+fn is_result(entry: &fs::DirEntry) -> bool {
+    let (name, path) = (entry.file_name(), entry.path());
+    let document = match name.to_string_lossy().starts_with("component-") {
+        true => path.join("atlas.json"),
+        false if name == "atlas.json" => path,
+        false => return false,
+    };
+    // Other programs have files of this name.
+    let mut start = Vec::new();
+    let read = fs::File::open(document).and_then(|file| file.take(START).read_to_end(&mut start));
+    read.is_ok() && String::from_utf8_lossy(&start).contains("\"format\": \"affine-atlas\"")
 }
 
 fn is_mesh(path: &Path) -> bool {
@@ -445,6 +472,35 @@ mod tests {
             error.to_string().ends_with("byte 0 is not UTF-8 text"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn results_are_no_inputs() {
+        let root = tree(&[
+            "a/atlas.json",
+            "a/surface.glb",
+            "b/component-002/atlas.json",
+            "b/surface.glb",
+            "c/atlas.json",
+            "c/c.glb",
+            "d/component-001/d.obj",
+        ]);
+        for result in ["a/atlas.json", "b/component-002/atlas.json"] {
+            let text = "{\n  \"format\": \"affine-atlas\",";
+            fs::write(root.path().join(result), text).unwrap();
+        }
+        assert_eq!(
+            found(root.path(), &["."]),
+            [
+                pair("./c/c.glb", "c/c.glb"),
+                pair("./d/component-001/d.obj", "d/component-001/d.obj")
+            ]
+        );
+        let of = |folder: &str| expand(&[folder.into()], root.path(), Path::new("out")).unwrap();
+        assert!(of("a").notes[0].contains("holds results of affine-atlas"));
+        assert!(of("b").files.is_empty());
+        // A file that is named is taken.
+        assert_eq!(of("a/surface.glb").files.len(), 1);
     }
 
     #[test]

@@ -435,7 +435,7 @@ pub struct Texture {
     /// Tiles along a side of a cell of the grid; `grid.cells` of the build says how large cells are
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(TILES_RANGE))]
     pub tiles: u32,
-    /// Texels along a side of the texture
+    /// Texels along a side of the texture; several components have as many in all, by their areas
     #[arg(long, value_name = "N", default_value_t = DEFAULT_SIZE, value_parser = clap::value_parser!(u32).range(SIZE_RANGE))]
     pub size: u32,
     /// Write JSON instead of text

@@ -3,22 +3,33 @@
 
 use super::exit;
 use super::terminal;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::time::Duration;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
-/// Time that a running stage gets to notice the first Ctrl-C.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// Time that everything gets to end by itself after the first Ctrl-C: workers have four seconds of it, and what they leave may be thousands of files to be removed.
+const PATIENCE: Duration = Duration::from_secs(20);
 
-static REQUESTS: AtomicU32 = AtomicU32::new(0);
+/// Who stops a program may signal it and its group, as `timeout` does: two requests that are no farther apart are one.
+const TOGETHER: Duration = Duration::from_millis(300);
+
+static FIRST: OnceLock<Instant> = OnceLock::new();
+static REQUESTED: AtomicBool = AtomicBool::new(false);
 static FINISHED: AtomicBool = AtomicBool::new(false);
 
 /// Installs the handler for Ctrl-C and termination; `remove_staging` removes what is half written,
 /// `announce` says on standard error what happens.
 pub fn install(remove_staging: fn(), announce: bool) {
     let installed = ctrlc::set_handler(move || {
-        if REQUESTS.fetch_add(1, Ordering::SeqCst) > 0 {
-            stop(remove_staging);
+        let now = Instant::now();
+        let first = *FIRST.get_or_init(|| now);
+        if first != now {
+            if now - first > TOGETHER {
+                stop(remove_staging);
+            }
+            return;
         }
+        REQUESTED.store(true, Ordering::SeqCst);
         if announce {
             terminal::print_error("stopping; press Ctrl-C again to stop at once\n");
         }
@@ -41,7 +52,7 @@ fn stop(remove_staging: fn()) -> ! {
 
 /// Whether Ctrl-C was pressed.
 pub fn requested() -> bool {
-    REQUESTS.load(Ordering::SeqCst) > 0
+    REQUESTED.load(Ordering::SeqCst)
 }
 
 /// The command ends by itself; nothing needs to be stopped any more.

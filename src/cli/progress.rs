@@ -324,7 +324,7 @@ impl Watcher for Progress {
             && cached > 0
         {
             terminal::print_error(&format!(
-                "{cached} of {} are as they should be, {} to build\n",
+                "{cached} of {} whole already, {} to build\n",
                 tasks.len(),
                 to_build.len()
             ));

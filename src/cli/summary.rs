@@ -1,7 +1,8 @@
 //! What became of every asset, in one line each.
 
-use affine_atlas::outcome::{AssetOutcome, Summary};
+use affine_atlas::outcome::{AssetOutcome, ComponentOutcome, Summary};
 use console::{measure_text_width, style, truncate_str};
+use std::path::Path;
 
 /// Columns, and the order in which they are left out where the terminal is narrow.
 const COLUMNS: [&str; 9] = [
@@ -20,7 +21,7 @@ const LEAVE_OUT: [usize; 6] = [8, 4, 5, 7, 2, 3];
 const WORDS: usize = 2;
 const FOLDER: &str = "folder";
 
-/// More assets than this are not listed one by one.
+/// More assets than this are not listed one by one, and more components of one neither.
 const MOST_LISTED: usize = 40;
 
 /// What became of a batch: the table, of many assets only of those that are not as they should be, and counts where there are several.
@@ -177,12 +178,22 @@ fn rows(outcome: &AssetOutcome) -> Vec<Row> {
                 "failed" => format!("{built} of {} built", several.len()),
                 state => state.to_owned(),
             };
-            let mut rows = vec![row(outcome.id.clone(), words, state, None, seconds)];
-            for component in several {
-                let state = if component.result.is_ok() {
-                    "built"
-                } else {
-                    "failed"
+            let is_listed = several.len() <= MOST_LISTED;
+            let (words, all) = match is_listed {
+                true => (words, None),
+                false => (
+                    format!("{words} ({} components)", several.len()),
+                    Some(together(several)),
+                ),
+            };
+            let all = all.flatten();
+            let mut rows = vec![row(outcome.id.clone(), words, state, all.as_ref(), seconds)];
+            let listed = several.iter().filter(|c| is_listed || c.result.is_err());
+            for component in listed {
+                let state = match (&component.result, state) {
+                    (Ok(_), "cached") => "cached",
+                    (Ok(_), _) => "built",
+                    (Err(_), _) => "failed",
                 };
                 rows.push(row(
                     format!("  component {}", component.index),
@@ -195,6 +206,27 @@ fn rows(outcome: &AssetOutcome) -> Vec<Row> {
             rows
         }
     }
+}
+
+/// Sums over components, and the worst of their errors.
+fn together(components: &[ComponentOutcome]) -> Option<Summary> {
+    let built = components.iter().filter_map(|c| c.result.as_ref().ok());
+    let sum = built.cloned().reduce(|a, b| Summary {
+        vertices: a.vertices + b.vertices,
+        faces: a.faces + b.faces,
+        genus: a.genus + b.genus,
+        boundary_loops: a.boundary_loops + b.boundary_loops,
+        cones: a.cones + b.cones,
+        max_curvature_error: a.max_curvature_error.max(b.max_curvature_error),
+        limited_by_float64: a.limited_by_float64 || b.limited_by_float64,
+        area_distortion: a.area_distortion.max(b.area_distortion),
+        folder: a.folder,
+    })?;
+    let of_asset = sum.folder.parent().map(Path::to_owned);
+    Some(Summary {
+        folder: of_asset.unwrap_or_default(),
+        ..sum
+    })
 }
 
 fn row(
@@ -294,7 +326,7 @@ pub fn log(outcome: &AssetOutcome) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use affine_atlas::outcome::{AssetState, ComponentOutcome, Failure, FailureKind};
+    use affine_atlas::outcome::{AssetState, Failure, FailureKind};
 
     fn sample() -> Vec<AssetOutcome> {
         // Also where the tests run on a terminal.
@@ -330,6 +362,29 @@ mod tests {
             },
             AssetOutcome::failed("möbius", failure, 0.1),
         ]
+    }
+
+    #[test]
+    fn of_many_components_those_that_failed_are_listed() {
+        let [spot, truck, ..] = &sample()[..] else {
+            panic!("two at least");
+        };
+        let [built, failed] = [&spot.components[0], &truck.components[1]];
+        let mut components = vec![built.clone(); MOST_LISTED];
+        components.push(failed.clone());
+        let figures = components[0].result.as_mut().expect("built");
+        figures.folder = "out/many/component-000".into();
+        let many = AssetOutcome {
+            components,
+            ..AssetOutcome::whole("many", AssetState::Built, 1.0)
+        };
+        let text = table(&[many], None);
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), 3, "{text}");
+        assert!(lines[1].starts_with("many") && lines[1].ends_with("out/many"));
+        assert!(lines[1].contains("built (41 components)"), "{text}");
+        assert!(lines[1].contains(&(MOST_LISTED * 2930).to_string()));
+        assert!(lines[2].contains("component 1") && lines[2].contains("failed"));
     }
 
     #[test]

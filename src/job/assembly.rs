@@ -70,8 +70,13 @@ impl Assembly {
         outcome
     }
 
-    /// Writes what all have in common, and puts the folder in place, where any atlas passed.
-    pub fn finish(self, publication: Publication<'_>, config: &Config) -> Result<(), BuildError> {
+    /// Writes what all have in common, and puts the folder in place, where any atlas passed. `notes`: what is said of the asset and its components.
+    pub fn finish(
+        self,
+        publication: Publication<'_>,
+        config: &Config,
+        notes: &[String],
+    ) -> Result<(), BuildError> {
         let (asset, given, id) = (publication.asset, publication.given, publication.id);
         let Some(staging) = publication.finish().filter(|_| self.new) else {
             return Ok(());
@@ -97,7 +102,7 @@ impl Assembly {
             }
             if config.report.enabled {
                 let _part = part!("page");
-                page::write(&staging, id, given, config, &self.rows)?;
+                page::write(&staging, id, given, config, &self.rows, notes)?;
             }
         }
         Ok(staging.publish()?)

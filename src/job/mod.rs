@@ -131,7 +131,8 @@ fn run_stages(
         outcome.notes.push(note);
     }
     let id = outcome.id.clone();
-    let publication = Publication::new(&asset, given, output, &id, config, observer);
+    let notes = outcome.notes.clone();
+    let publication = Publication::new(&asset, given, output, &id, config, notes, observer);
     let mut assembly = Assembly::default();
     let mut parts = Vec::new();
     components::each(
@@ -142,18 +143,14 @@ fn run_stages(
         |published| {
             let published = published?;
             for note in &published.notes {
-                let note = match published.components {
-                    1 => format!("{given} {note}"),
-                    _ => format!("component {} of {given} {note}", published.index),
-                };
                 tracing::warn!(asset = id, "{note}");
-                outcome.notes.push(note);
             }
+            outcome.notes.extend_from_slice(&published.notes);
             parts.push(assembly.add(published));
             Ok(())
         },
     )?;
-    assembly.finish(publication, config)?;
+    assembly.finish(publication, config, &outcome.notes)?;
     outcome.files = list_files(&output.join(&id)).unwrap_or_default();
     outcome.components = parts;
     Ok(())

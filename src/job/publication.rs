@@ -26,6 +26,8 @@ pub(super) struct Publication<'a> {
     output: &'a Path,
     pub id: &'a str,
     config_blake3: String,
+    /// What is said of the whole asset, for its pages.
+    notes: Vec<String>,
     observer: &'a dyn Observer,
     /// Made for the first atlas: where there is none, nothing is touched.
     staging: Mutex<Option<Arc<Staging>>>,
@@ -67,6 +69,7 @@ impl<'a> Publication<'a> {
         output: &'a Path,
         id: &'a str,
         config: &Config,
+        notes: Vec<String>,
         observer: &'a dyn Observer,
     ) -> Self {
         Self {
@@ -75,6 +78,7 @@ impl<'a> Publication<'a> {
             output,
             id,
             config_blake3: config.hash(),
+            notes,
             observer,
             staging: Mutex::default(),
         }
@@ -117,10 +121,26 @@ impl<'a> Publication<'a> {
                 });
             }
         };
-        let notes = warnings(&atlas, config);
+        let notes = self.said_of(&atlas, index, components, config);
         let folder = self.output.join(self.id);
         let folder = folder.join(Self::subfolder(index, components));
         Ok(published(Ok(Summary::of(&atlas, folder)), notes, shown))
+    }
+
+    /// What the user should know of an atlas, in sentences.
+    fn said_of(
+        &self,
+        atlas: &AffineAtlas,
+        component: usize,
+        components: usize,
+        config: &Config,
+    ) -> Vec<String> {
+        let given = self.given;
+        let whole = |note| match components {
+            1 => format!("{given} {note}"),
+            _ => format!("component {component} of {given} {note}"),
+        };
+        warnings(atlas, config).into_iter().map(whole).collect()
     }
 
     /// Writes the atlas of a component, checks it and draws it; its images, which nothing else asks for, are gone then. The inner error says why it is
@@ -187,7 +207,12 @@ impl<'a> Publication<'a> {
         let describe = || match has_page {
             true => {
                 let _part = part!("page");
-                report_page::write(staging, &subfolder, atlas, &provenance, &config.report)
+                // Where there are several, what concerns them all is on the page of all.
+                let of_asset = self.notes.iter().filter(|_| components == 1).cloned();
+                let own = self.said_of(atlas, component, components, config);
+                let notes: Vec<String> = of_asset.chain(own).collect();
+                let params = &config.report;
+                report_page::write(staging, &subfolder, atlas, &provenance, params, &notes)
             }
             false => Ok(()),
         };

@@ -8,8 +8,9 @@ use crate::export::glb::textured::{self, Textured};
 use crate::export::pictures::colour::to_linear;
 use crate::export::pictures::{encode_png, painted as picture};
 use crate::geometry::connectivity::ConnectivityError;
-use crate::geometry::mesh::Mesh;
+use crate::geometry::mesh::{Mesh, triangle_area};
 use crate::outcome::{Failure, FailureKind};
+use crate::parallel;
 use crate::read::atlas::{FolderError, component_folders};
 use crate::read::gridded::{GriddedSurface, read_gridded};
 use crate::texture::{
@@ -26,6 +27,8 @@ pub const TILES_RANGE: std::ops::RangeInclusive<i64> = 1..=64;
 pub const DEFAULT_SIZE: u32 = 2048;
 /// Texels along a side that may be asked for.
 pub const SIZE_RANGE: std::ops::RangeInclusive<i64> = 16..=8192;
+/// Texels along a side that each component has at least, unless fewer are asked for.
+const LEAST_SIDE: usize = 64;
 /// File of the figures.
 const FIGURES: &str = "texture.json";
 /// Pixels of the picture.
@@ -38,7 +41,7 @@ pub struct TextureParams {
     pub pattern: PathBuf,
     /// Tiles along a side of a cell.
     pub tiles: u32,
-    /// Texels along a side of the texture.
+    /// Texels along a side of the texture; components share out its area by theirs.
     pub size: usize,
 }
 
@@ -112,6 +115,18 @@ impl From<&TextureAssetError> for Failure {
     }
 }
 
+fn area(surface: &GriddedSurface) -> f64 {
+    let corners = |face: &[u32; 3]| face.map(|v| surface.positions[v as usize]);
+    let faces = surface.faces.iter();
+    faces.map(|face| triangle_area(corners(face))).sum()
+}
+
+/// Texels along a side of the texture of a component with this share of the area: all together have as many as that of a single one, but each some.
+fn side_of_share(size: usize, share: f64) -> usize {
+    let side = (size as f64 * share.sqrt()).ceil() as usize;
+    side.clamp(LEAST_SIDE.min(size), size)
+}
+
 /// Lays a pattern over every component of an asset's folder.
 ///
 /// # Errors
@@ -120,18 +135,24 @@ pub fn texture(folder: &Path, params: &TextureParams) -> Result<TexturedAsset, T
     let folders = component_folders(folder)?;
     let exemplar = Exemplar::read(&params.pattern)?;
     let tiling = Tiling::new(params.tiles, exemplar.size());
-    let mut components = Vec::new();
-    for folder in folders {
-        let name = folder_name(&folder);
+    let read = |folder: PathBuf| {
         let surface = read_gridded(&folder)?;
+        Ok::<_, TextureAssetError>((folder_name(&folder), surface))
+    };
+    let surfaces: Vec<_> = folders.into_iter().map(read).collect::<Result<_, _>>()?;
+    let areas: Vec<f64> = surfaces.iter().map(|(_, surface)| area(surface)).collect();
+    let total: f64 = areas.iter().sum();
+    let parts = surfaces.into_iter().zip(areas).collect();
+    let textured = |((name, surface), area): ((String, GriddedSurface), f64)| {
         let mesh = Mesh::bare(surface.positions.clone(), &surface.faces);
         let mesh = mesh.map_err(|source| TextureAssetError::Connectivity {
             name: name.clone(),
             source,
         })?;
-        let painted = paint(&surface, &tiling, &exemplar, params.size);
+        let size = side_of_share(params.size, area / total);
+        let painted = paint(&surface, &tiling, &exemplar, size);
         let on_grid = surface.grid_uv.iter().map(|&uv| 0.5 * doubled_area(uv));
-        components.push(TexturedComponent {
+        Ok(TexturedComponent {
             name,
             cells: on_grid.sum::<f64>().round() as usize,
             tile_size: tile_size(&surface, &tiling),
@@ -139,8 +160,12 @@ pub fn texture(folder: &Path, params: &TextureParams) -> Result<TexturedAsset, T
             mesh,
             painted,
             surface,
-        });
-    }
+        })
+    };
+    let components = parallel::beside(parts, textured);
+    let components = components
+        .into_iter()
+        .collect::<Result<_, TextureAssetError>>()?;
     let name = params.pattern.file_name().unwrap_or_default();
     Ok(TexturedAsset {
         components,

@@ -3,19 +3,34 @@
 use crate::config::Config;
 use crate::product::AffineAtlas;
 
+/// Sides of cells that differ by a greater factor are told.
+const MOST_UNEVEN: f64 = 10.0;
+
 /// What was asked for and could not be had, and much distortion, beginning with a verb.
 pub(super) fn warnings(atlas: &AffineAtlas, config: &Config) -> Vec<String> {
     let mut notes = Vec::new();
     let (quality, most) = (&atlas.quality, config.report.distortion_warning);
+    let flat =
+        "images.domain = \"flat\" follows no sharp edges and borders, and is drawn more evenly";
     if quality.log_scale.std > most {
         notes.push(format!(
             "is drawn unevenly: the log scale deviates by {:.2} (report.distortion_warning = {most}), area distortion (9) is {:.2}; {}; `affine-atlas explain` shows where",
             quality.log_scale.std,
             quality.area_distortion,
             match atlas.grid {
-                Some(_) => "images.domain = \"flat\" follows no sharp edges and borders, and is drawn more evenly",
+                Some(_) => flat,
                 None => "more cones help (`affine-atlas cones` shows how much)",
             }
+        ));
+    } else if let Some(grid) = &atlas.grid
+        && grid.distortion.edge_ratio.p95 > MOST_UNEVEN * grid.distortion.edge_ratio.p05
+    {
+        let [p05, p95] = [
+            grid.distortion.edge_ratio.p05,
+            grid.distortion.edge_ratio.p95,
+        ];
+        notes.push(format!(
+            "has cells of very different sizes: of 20 of their sides one is shorter than {p05:.2} and one longer than {p95:.2} times that of a mean cell; {flat}"
         ));
     }
     if let Some(met) = &atlas.metric.quarter_turns

@@ -64,13 +64,14 @@ impl Default for ReportParams {
 }
 
 /// Writes the report of an atlas into a staging folder; `subfolder` as for
-/// [`write_component`](crate::export::write_component).
+/// [`write_component`](crate::export::write_component), `notes` what the build said of it.
 pub fn write(
     staging: &Staging,
     subfolder: &str,
     atlas: &AffineAtlas,
     provenance: &Provenance,
     params: &ReportParams,
+    notes: &[String],
 ) -> Result<(), ExportError> {
     let path = match subfolder {
         "" => FILE_NAME.to_owned(),
@@ -80,7 +81,7 @@ pub fn write(
         path: staging.target().join(&path),
         message: error.to_string(),
     };
-    let page = page(atlas, provenance, params, encoding)?;
+    let page = page(atlas, provenance, params, notes, encoding)?;
     staging.write(&path, page.as_bytes())
 }
 
@@ -89,6 +90,7 @@ fn page(
     atlas: &AffineAtlas,
     provenance: &Provenance,
     params: &ReportParams,
+    notes: &[String],
     encoding: impl Fn(io::Error) -> ExportError,
 ) -> Result<String, ExportError> {
     let document = atlas_json::describe(atlas, provenance)?;
@@ -100,6 +102,7 @@ fn page(
     };
     let mut body = String::new();
     header(&mut body, &document, provenance);
+    list_notes(&mut body, notes);
     match &drawing {
         Some(drawing) => body.push_str(&views(drawing)),
         None => {
@@ -180,6 +183,18 @@ fn page(
     let title = format!("{} · affine atlas", provenance.asset);
     let scripts = [html::TABLES, SURFACE, SCRIPT];
     Ok(html::page(&title, STYLE, &body, &scripts, html::INSIDE))
+}
+
+/// What the build said on standard error, for who comes later.
+fn list_notes(body: &mut String, notes: &[String]) {
+    if notes.is_empty() {
+        return;
+    }
+    body.push_str("<h2>Notes</h2>\n<ul>\n");
+    for note in notes {
+        let _ = writeln!(body, "<li>{}</li>", escape(note));
+    }
+    body.push_str("</ul>\n");
 }
 
 fn header(body: &mut String, document: &Document, provenance: &Provenance) {

@@ -4,7 +4,7 @@ use crate::geometry::mesh::Appearance;
 use serde_json::Value;
 
 fn text_of(atlas: &AffineAtlas, provenance: &Provenance, params: &ReportParams) -> String {
-    page(atlas, provenance, params, |error| panic!("{error}")).unwrap()
+    page(atlas, provenance, params, &[], |error| panic!("{error}")).unwrap()
 }
 
 /// Attributes of the elements that have `data-key`.

@@ -3,7 +3,7 @@
 //! *Enters:* what became of each component. *Leaves:* a page beside their folders, which shows `preview.png` beside it and links to what is in the folders.
 
 use super::tables::{cell, row, table, whole};
-use super::{FILE_NAME, STYLE};
+use super::{FILE_NAME, STYLE, list_notes};
 use crate::config::Config;
 use crate::export::ExportError;
 use crate::export::folder::Staging;
@@ -24,18 +24,20 @@ pub struct Row {
     pub has_page: bool,
 }
 
-/// Writes the page into a staging folder. `given`: the input as the user wrote it.
+/// Writes the page into a staging folder. `given`: the input as the user wrote it; `notes`: what the build said of it and its components.
 pub fn write(
     staging: &Staging,
     asset: &str,
     given: &str,
     config: &Config,
     rows: &[Row],
+    notes: &[String],
 ) -> Result<(), ExportError> {
-    staging.write(FILE_NAME, page(asset, given, config, rows).as_bytes())
+    let page = page(asset, given, config, rows, notes);
+    staging.write(FILE_NAME, page.as_bytes())
 }
 
-fn page(asset: &str, given: &str, config: &Config, rows: &[Row]) -> String {
+fn page(asset: &str, given: &str, config: &Config, rows: &[Row], notes: &[String]) -> String {
     let failed = rows.iter().filter(|r| r.outcome.result.is_err()).count();
     let mut body = format!(
         "<h1>{}</h1>\n<p>Made from <code>{}</code>: {} components, counted from 0",
@@ -61,6 +63,7 @@ fn page(asset: &str, given: &str, config: &Config, rows: &[Row]) -> String {
             "<img src=\"./{PREVIEW}\" alt=\"All components with a checkerboard in flat coordinates\" style=\"max-width: min(100%, 40rem)\">"
         );
     }
+    list_notes(&mut body, notes);
     let _ = write!(body, "<h2>Components</h2>\n{}", components(rows));
     let title = format!("{asset} · affine atlas");
     html::page(&title, STYLE, &body, &[html::TABLES], html::BESIDE)
