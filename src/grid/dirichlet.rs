@@ -59,8 +59,14 @@ impl Rest {
         }
     }
 
+    /// The row w of which J gains δ wᵀ where a corner moves by δ.
+    pub fn weights(&self, corner: usize) -> [f64; 2] {
+        let [q, r] = self.inverse;
+        [[-q[0] - r[0], -q[1] - r[1]], q, r][corner]
+    }
+
     /// J for corners on the grid: rows.
-    fn jacobian(&self, [p, q, r]: [[f64; 2]; 3]) -> [[f64; 2]; 2] {
+    pub fn jacobian(&self, [p, q, r]: [[f64; 2]; 3]) -> [[f64; 2]; 2] {
         let d = [[q[0] - p[0], r[0] - p[0]], [q[1] - p[1], r[1] - p[1]]];
         let b = self.inverse;
         std::array::from_fn(|i| std::array::from_fn(|j| d[i][0] * b[0][j] + d[i][1] * b[1][j]))

@@ -5,9 +5,10 @@
 use super::complex::turned;
 use super::density::Units;
 use super::dirichlet::{Rest, first_root, turned_back};
+use super::fan::Around;
 use super::map::{Corners, Freedom, GridMap};
 use super::system::Derivatives;
-use crate::geometry::ids::{FaceId, FaceVec};
+use crate::geometry::ids::{FaceId, FaceVec, VertexId};
 use rayon::prelude::*;
 
 /// Faces a piece of work has at least.
@@ -74,6 +75,14 @@ impl Energy {
 
     pub fn is_above(&self, density: f64, f: FaceId, place: &Places) -> bool {
         self.of(f, place) > density * self.rest[f].area
+    }
+
+    /// A face as one of its vertices moves.
+    pub fn around(&self, f: FaceId, v: VertexId, place: &Places) -> Around {
+        let vertices = self.corners.vertices(f);
+        let corner = vertices.iter().position(|&w| w == v.raw()).unwrap_or(0);
+        let (corners, turns) = (self.corners.corners(f, place), self.corners.turns(f));
+        Around::new(&self.rest[f], corners, corner, turns[corner])
     }
 
     /// How far vertices may go along `step` before a face has no area; infinity where it always has one.

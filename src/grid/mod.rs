@@ -13,6 +13,7 @@ mod dirichlet;
 mod distortion;
 mod energy;
 mod error;
+mod fan;
 mod follow;
 pub mod islands;
 pub mod lattice;

@@ -22,6 +22,9 @@ const BESIDE: f64 = 0.05;
 /// The same for those farther aside, where the line crosses the edge opposite by less than this part of it from them.
 const NARROW: f64 = 1e-3;
 
+/// Vertices that are off a line by less than this part of their distance from its last vertex are on it, to rounding.
+const EXACT: f64 = 1e-14;
+
 /// Part of its thickness that a thin face keeps at least where a corner is moved.
 const KEPT: f64 = 0.1;
 
@@ -225,7 +228,8 @@ impl Sheet {
                     true => &mut touching,
                     false => &mut best,
                 };
-                if is_along(edge, to) && best.is_none_or(|(most, ..)| rank > most) {
+                let is_better = best.is_none_or(|(most, ..)| rank > most);
+                if is_along(edge, to) && is_better && (is_end || self.fits(aim, h)) {
                     *best = Some((rank, aim, h));
                 }
             }
@@ -248,6 +252,23 @@ impl Sheet {
             .beside(aim, goal, may_move)
             .map_or(Way::Into, Way::Along);
         Some((aim, way))
+    }
+
+    /// Whether the other end of an edge of a corner may be moved onto the line from there: its star may be smaller than the way.
+    fn fits(&self, aim: Aim, h: HalfedgeId) -> bool {
+        let c = &self.fine.connectivity;
+        let end = if h == aim.corner { c.next(h) } else { h };
+        let by = self.onto(aim, end);
+        length(by) <= EXACT * length(minus(self.at(end), self.at(aim.corner)))
+            || self.moves_without_harm(end, by)
+    }
+
+    /// From the vertex of a corner of a face to the nearest place on a line that begins in that face.
+    fn onto(&self, aim: Aim, end: HalfedgeId) -> [f64; 2] {
+        let p = self.at(aim.corner);
+        let (d, edge) = (minus(aim.target, p), minus(self.at(end), p));
+        let along = dot(edge, d) / dot(d, d);
+        minus([along * d[0], along * d[1]], edge)
     }
 
     fn is_on_line(&self, v: VertexId) -> bool {
@@ -287,9 +308,8 @@ impl Sheet {
                 || c.is_boundary_vertex(v)
                 || c.outgoing(v)
                     .any(|h| self.line[c.edge(h)] != NONE || is_first(h));
-            let by = minus([along * d[0], along * d[1]], edge);
             let is_nearer = best.is_none_or(|(least, _)| off < least);
-            if is_nearer && !is_kept && self.moves_without_harm(end, by) {
+            if is_nearer && !is_kept && self.moves_without_harm(end, self.onto(aim, end)) {
                 best = Some((off, h));
             }
         }
@@ -361,11 +381,7 @@ impl Sheet {
                         return Ok(c.tail(end));
                     }
                     // Exactly on the line, so that what follows is straight.
-                    let (p, a) = (self.at(aim.corner), self.at(end));
-                    let d = minus(aim.target, p);
-                    let along = dot(minus(a, p), d) / dot(d, d);
-                    let on_line = [p[0] + along * d[0], p[1] + along * d[1]];
-                    self.move_by(end, minus(on_line, a));
+                    self.move_by(end, self.onto(aim, end));
                     Aim {
                         corner: end,
                         target: aim.target,
@@ -544,3 +560,6 @@ impl Sheet {
         v
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -7,6 +7,7 @@
 //! half as many suffice.
 
 use super::energy::{Energy, Places};
+use super::fan::{self, Around};
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{FaceId, VertexId};
 
@@ -71,57 +72,26 @@ fn move_vertex(
     place: &mut Places,
     is_free: [bool; 2],
 ) -> bool {
-    let Some((step, slope)) = newton_step(energy, star, v, place, is_free) else {
+    let fan: Vec<Around> = star.iter().map(|&f| energy.around(f, v, place)).collect();
+    let Some((step, slope)) = fan::newton_step(&fan, is_free) else {
         return false;
     };
-    let around = |place: &Places| -> f64 { star.iter().map(|&f| energy.of(f, place)).sum() };
-    let own = |w: u32| if w == v.raw() { step } else { [0.0; 2] };
-    let longest = star.iter().map(|&f| energy.longest(f, place, own));
-    let mut length = (BEFORE_FLAT * longest.fold(f64::INFINITY, f64::min)).min(1.0);
-    let (from, before) = (place[v.index()], around(place));
+    let mut length = (BEFORE_FLAT * fan::longest(&fan, step)).min(1.0);
+    let (from, before) = (place[v.index()], fan::energy(&fan, [0.0; 2]));
     for _ in 0..MOST_HALVINGS {
-        place[v.index()] = [0, 1].map(|i| from[i] + length * step[i]);
-        let there = around(place);
+        let by = step.map(|x| length * x);
+        let there = fan::energy(&fan, by);
         if there <= before + SUFFICIENT * length * slope {
-            return before - there > LEAST_GAIN * before;
+            place[v.index()] = [0, 1].map(|i| from[i] + by[i]);
+            // Rounded places may say otherwise.
+            if star.iter().all(|&f| energy.of(f, place).is_finite()) {
+                return before - there > LEAST_GAIN * before;
+            }
         }
         length *= 0.5;
     }
     place[v.index()] = from;
     false
-}
-
-/// The step of one vertex, and the slope of the energy along it; `None` where it does not fall.
-fn newton_step(
-    energy: &Energy,
-    star: &[FaceId],
-    v: VertexId,
-    place: &Places,
-    is_free: [bool; 2],
-) -> Option<([f64; 2], f64)> {
-    let (mut g, mut h) = ([0.0; 2], [[0.0; 2]; 2]);
-    for &f in star {
-        let (gradient, hessian) = energy.derivatives(f, place);
-        let vertices = energy.corners.vertices(f);
-        let own = || (0..3).filter(|&k| vertices[k] == v.raw());
-        for (k, a) in own().flat_map(|k| [(k, 0), (k, 1)]) {
-            g[a] += gradient[2 * k + a];
-            for (l, b) in own().flat_map(|l| [(l, 0), (l, 1)]) {
-                h[a][b] += hessian[2 * k + a][2 * l + b];
-            }
-        }
-    }
-    for a in (0..2).filter(|&a| !is_free[a]) {
-        (g[a], h[a], h[1 - a][a]) = (0.0, [0.0; 2], 0.0);
-        h[a][a] = 1.0;
-    }
-    let determinant = h[0][0] * h[1][1] - h[0][1] * h[1][0];
-    let step = [
-        (h[0][1] * g[1] - h[1][1] * g[0]) / determinant,
-        (h[1][0] * g[0] - h[0][0] * g[1]) / determinant,
-    ];
-    let slope = step[0] * g[0] + step[1] * g[1];
-    (slope < 0.0).then_some((step, slope))
 }
 
 #[cfg(test)]

@@ -50,7 +50,9 @@ impl<'a> Content<'a> {
     fn next(&mut self) -> Option<(Vec<&'a [u8]>, Place)> {
         loop {
             let line = self.0.next()?;
-            let words: Vec<_> = words(line).collect();
+            // There are no names that it could be part of.
+            let end = line.iter().position(|&b| b == b'#');
+            let words: Vec<_> = words(&line[..end.unwrap_or(line.len())]).collect();
             if !words.is_empty() {
                 return Some((words, Place::Line(self.0.number)));
             }

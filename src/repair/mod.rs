@@ -9,7 +9,7 @@
 //!
 //! 1. **weld** ([`weld`]): vertices at one position become one, but only where that can close
 //!    something: both lie on an open edge, or an edge joins them (it has length zero, or next to none
-//!    beside the others of its faces). Two closed sheets that merely touch stay apart.
+//!    beside the others of its faces, or beside these and the mesh). Two closed sheets that merely touch stay apart.
 //! 2. **clean** ([`clean`]): faces with a repeated vertex and duplicates go; faces without area whose
 //!    corners lie on one line, to within what float32 rounds, are taken out so that no T-junction stays.
 //! 3. **glue** ([`glue`]): which sides of faces are joined. Two faces at an edge always are; where more
@@ -18,7 +18,7 @@
 //! 4. **assemble** ([`assemble`]): one vertex a fan, one mesh a component, doubled edges split.
 //!
 //! *Guaranteed:* surviving vertices and faces of components with at most 131,072 faces keep the order of the file (copies and new vertices
-//! come last), larger ones lie along a space-filling curve; the surface stays where it is, to a millionth of its faces' length, when nothing is welded with a tolerance; same input, same output.
+//! come last), larger ones lie along a space-filling curve; the surface stays where it is, to two millionths of its size, when nothing is welded with a tolerance; same input, same output.
 //! *Not guaranteed:* that a closed component encloses a positive volume (the majority of the input's
 //! faces decides which side is out, not the volume), nor freedom from self-intersections.
 

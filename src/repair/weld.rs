@@ -6,7 +6,7 @@
 //! face) of the file's own connectivity: a vertex whose fans are all complete lacks nothing. Ends of one edge
 //! at one position are joined in any case, since no metric has an edge of length zero; so are those of an edge
 //! that is nothing beside the others of all its faces, as Boolean operations and marching cubes leave them where
-//! float32 rounds the same point twice.
+//! float32 rounds the same point twice, or where a file has six decimals.
 
 use crate::geometry::mesh::{bounding_box, distance};
 use crate::repair::RepairParams;
@@ -16,6 +16,12 @@ use std::collections::{BTreeMap, HashMap};
 
 /// An edge that is shorter than this part of the longest edge of each of its faces is one point: a few units in the last place of float32 coordinates.
 const NEEDLE: f64 = 2e-6;
+
+/// So is one that is shorter than this part of the size of the mesh, a few units in the last place of coordinates that were rounded far from
+/// the origin or written with six decimals, …
+const ROUNDED: f64 = 2e-6;
+/// … and than this part of the longest edge of each of its faces.
+const THIN: f64 = 1e-4;
 
 /// For every vertex the one that stands for it (itself, or a lower index at the same position). `faces` are those of the file;
 /// adds a change for each that is gone and for each that no face uses.
@@ -135,6 +141,12 @@ fn weld_within(
 /// Joins the ends of edges whose faces are all needles, shortest first; not transitively.
 fn join_needles(positions: &[[f64; 3]], faces: &[[u32; 3]], stands_for: &mut [u32]) {
     let at = |v: u32| positions[v as usize];
+    let corners: Vec<[f64; 3]> = faces.iter().flatten().map(|&v| at(v)).collect();
+    let (low, high) = bounding_box(&corners);
+    let rounded = ROUNDED * distance(low, high);
+    let is_nothing = |length: f64, longest: f64| {
+        length <= NEEDLE * longest || (length <= rounded && length <= THIN * longest)
+    };
     let corners = |face: &[u32; 3], stands_for: &mut [u32]| face.map(|v| root(stands_for, v));
     let lengths = |f: [u32; 3]| [0, 1, 2].map(|k| distance(at(f[k]), at(f[(k + 1) % 3])));
     let longest = |lengths: [f64; 3]| lengths.into_iter().fold(0.0, f64::max);
@@ -147,7 +159,7 @@ fn join_needles(positions: &[[f64; 3]], faces: &[[u32; 3]], stands_for: &mut [u3
             let longest = longest(lengths);
             for (k, &length) in lengths.iter().enumerate() {
                 let [a, b] = [f[k], f[(k + 1) % 3]];
-                let (edge, is_needle) = ([a.min(b), a.max(b)], length <= NEEDLE * longest);
+                let (edge, is_needle) = ([a.min(b), a.max(b)], is_nothing(length, longest));
                 match (is_last, is_needle) {
                     (false, true) if a != b => {
                         let shortest = needles.entry(edge).or_insert([length, longest]);
@@ -168,7 +180,7 @@ fn join_needles(positions: &[[f64; 3]], faces: &[[u32; 3]], stands_for: &mut [u3
     needles.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
     for ([a, b], [_, longest]) in needles {
         let [p, q] = [a, b].map(|v| at(root(stands_for, v)));
-        if distance(p, q) <= NEEDLE * longest {
+        if is_nothing(distance(p, q), longest) {
             join(stands_for, a, b);
         }
     }

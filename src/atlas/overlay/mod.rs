@@ -39,7 +39,7 @@ use crossings::Crossings;
 use layout::Refinement;
 use mirror::{Half, Place};
 use polygon::Faces;
-use positions::{Positions, PositionsError};
+use positions::{Positions, PositionsError, SPACING, SPACING_UNDER_GRID};
 use regions::{Ground, Inputs, Regions};
 
 /// A surface with positions and flat lengths on the same faces.
@@ -159,7 +159,12 @@ fn overlay_of(
     let curves = intrinsic
         .base_on_flat
         .trace(&intrinsic.base, &intrinsic.flat)?;
-    let places = positions::positions(&intrinsic, &curves)?;
+    // The metric of a grid turns by quarter turns.
+    let spacing = match metric.quarter_turns {
+        Some(_) => SPACING_UNDER_GRID,
+        None => SPACING,
+    };
+    let places = positions::positions(&intrinsic, &curves, spacing)?;
     refine(mesh, metric, prescription, *intrinsic, &curves, &places)
 }
 

@@ -2,7 +2,7 @@
 //!
 //! *Enters:* the three triangulations of the flow, and the edges of A as curves on C. *Leaves:* for every crossing its place on
 //! the base edge and on the flat edge. *Guaranteed:* whatever the rounding, places increase strictly along every base edge in
-//! the order of the curve and along every flat edge in the order of the ranks, with room between them ([`SPACING`]):
+//! the order of the curve and along every flat edge in the order of the ranks, with room between them ([`SPACING`], [`SPACING_UNDER_GRID`]):
 //! the integers say what crosses what, geometry only where. *Not guaranteed:* that a place is exact. Where two crossings would
 //! be closer than the spacing they are pushed apart, and where the drawn curves bound a bigon that minimal position
 //! does not have, the places are those before it was removed.
@@ -22,7 +22,7 @@ mod spacing;
 mod straight;
 mod words;
 
-pub use spacing::SPACING;
+pub use spacing::{SPACING, SPACING_UNDER_GRID};
 
 use crate::flow::correspondence::{CorrespondenceError, Curves};
 use crate::flow::intrinsic::Intrinsic;
@@ -80,14 +80,24 @@ pub enum PositionsError {
 /// Places of all crossings of base edges with final edges.
 ///
 /// `curves` are the edges of A on C, traced from `intrinsic.base_on_flat`. Linear in the number of crossings among the three
-/// triangulations; the result does not depend on the number of threads.
-pub fn positions(intrinsic: &Intrinsic, curves: &Curves) -> Result<Positions, PositionsError> {
+/// triangulations; the result does not depend on the number of threads. `spacing`: room between the crossings of an edge, as in [`SPACING`].
+pub fn positions(
+    intrinsic: &Intrinsic,
+    curves: &Curves,
+    spacing: f64,
+) -> Result<Positions, PositionsError> {
     let (base, delaunay, flat) = (&intrinsic.base, &intrinsic.delaunay, &intrinsic.flat);
     let (base_on_delaunay, delaunay_on_flat) = rayon::join(
         || intrinsic.base_on_delaunay.trace(base, delaunay),
         || intrinsic.delaunay_on_flat.trace(delaunay, flat),
     );
-    placed(intrinsic, &base_on_delaunay?, &delaunay_on_flat?, curves)
+    placed(
+        intrinsic,
+        &base_on_delaunay?,
+        &delaunay_on_flat?,
+        curves,
+        spacing,
+    )
 }
 
 /// The same from curves that are traced already: A on B, B on C and A on C.
@@ -96,6 +106,7 @@ fn placed(
     base_on_delaunay: &Curves,
     delaunay_on_flat: &Curves,
     curves: &Curves,
+    spacing: f64,
 ) -> Result<Positions, PositionsError> {
     let (base, delaunay, flat) = (&intrinsic.base, &intrinsic.delaunay, &intrinsic.flat);
     for (curves, from, to) in [
@@ -152,7 +163,7 @@ fn placed(
             values.clear();
             values.extend(places[first..].iter().map(|place| place.0[0]));
             spacing::fill(values);
-            spacing::spread(values, blocks);
+            spacing::spread(values, spacing, blocks);
             for (place, &value) in places[first..].iter_mut().zip(values.iter()) {
                 place.0[0] = value;
             }
@@ -167,7 +178,7 @@ fn placed(
             values.clear();
             values.extend(crossings.iter().map(|&i| places[i as usize].0[1]));
             spacing::fill(values);
-            spacing::spread(values, blocks);
+            spacing::spread(values, spacing, blocks);
             ordered.extend(crossings.iter().copied().zip(values.iter().copied()));
             Ok(())
         },

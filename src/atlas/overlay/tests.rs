@@ -282,7 +282,7 @@ fn geodesic_case(mesh: Mesh, flips: usize, seed: u64) -> Case {
         base,
         flat,
     };
-    let places = positions::positions(&intrinsic, &curves).unwrap();
+    let places = positions::positions(&intrinsic, &curves, SPACING).unwrap();
     assert_eq!(places.unmatched, 0);
     Case {
         mesh,

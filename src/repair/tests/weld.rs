@@ -112,6 +112,17 @@ fn what_float32_rounds_twice_is_one_point() {
             welded == 1
         );
     }
+    // On a mesh that is large beside its faces, coordinates are rounded more than these are: a corner far away makes it so.
+    for (apart, far, welded) in [(5e-5, 1e3, 1), (5e-5, 4.0, 0), (5e-4, 1e3, 0)] {
+        let mut cube = cube(4);
+        let at = |p: [f64; 3]| cube.positions.iter().position(|&q| q == p).unwrap();
+        let (v, top) = (at([2.0, 2.0, 0.0]), at([4.0, 4.0, 4.0]));
+        cube.positions[v] = [2.0, 3.0 - apart, 0.0];
+        cube.positions[top] = [far; 3];
+        let result = repaired(&cube);
+        assert_eq!(count(&result, "welded_vertices"), welded, "{apart} {far}");
+        assert_eq!(chi(only(&result)), 2);
+    }
     // A short edge with one face that is no needle stays, and so does a chain that is long in all.
     let positions: Vec<[f64; 3]> = (0..=3)
         .map(|i| [1.5e-6 * f64::from(i), 0.0, 0.0])

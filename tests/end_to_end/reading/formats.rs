@@ -359,6 +359,11 @@ fn off_headers_comments_and_polygons() {
         assert_eq!(soup.faces, faces, "{head}");
         assert_eq!(soup.positions[2], [1.0, 1.0, 0.0]);
     }
+    let glued = soup(
+        "a.off",
+        "OFF\n3 1 0#counts\n0 0 0\n1 0 0#red\n0 1 0\n3 0 1 2#\n",
+    );
+    assert_eq!(glued.faces, [[0, 1, 2]]);
     let asset = asset(
         "a.off",
         "OFF\n3 1 0\n0 0 0 9\n1 0 0 9\n0 1 0 9\n3 0 1 2\n3 2 1 0\n",

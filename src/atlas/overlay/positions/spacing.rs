@@ -1,12 +1,14 @@
 //! Positions that keep a prescribed order, with room between them.
 //!
 //! *Enters:* wanted fractions of an edge, in the order that the integers say. *Leaves:* fractions that increase strictly.
-//! *Guaranteed:* for any input (NaN included) neighbours, and the ends 0 and 1, are at least about [`SPACING`] / (n + 1) apart.
+//! *Guaranteed:* for any input (NaN included) neighbours, and the ends 0 and 1, are at least about `spacing` / (n + 1) apart.
 //! *Not guaranteed:* that a value stays where it was wanted; where the order allows it, it does.
 
 /// Fraction of an edge that all its crossings together may be pushed to make room: n crossings keep a distance of
-/// `SPACING / (n + 1)` from each other and from the ends.
+/// `SPACING / (n + 1)` from each other and from the ends. For flat patches, which are to be as conformal as the flow left them.
 pub const SPACING: f64 = 1e-7;
+/// The same for a grid, whose map is relaxed afterwards: what lies between crossings that are nearer is too thin for float64 to tell angles from lengths, or lines from vertices.
+pub const SPACING_UNDER_GRID: f64 = 1e-4;
 
 /// Replaces what is not finite by even steps between its known neighbours; 0 and 1 stand before and after the list.
 pub(super) fn fill(values: &mut [f64]) {
@@ -34,14 +36,14 @@ pub(super) fn fill(values: &mut [f64]) {
 }
 
 /// Moves the values, which must be finite, as little as needed (least squares) to make them increase by steps of at least
-/// `SPACING / (n + 1)`, the ends 0 and 1 included. `blocks` is scratch space.
-pub(super) fn spread(values: &mut [f64], blocks: &mut Vec<(f64, usize)>) {
-    let step = SPACING / (values.len() + 1) as f64;
-    // Without the steps that it must keep, the sequence has only to be nondecreasing within [0, 1 − SPACING]:
+/// `spacing / (n + 1)`, the ends 0 and 1 included. `blocks` is scratch space.
+pub(super) fn spread(values: &mut [f64], spacing: f64, blocks: &mut Vec<(f64, usize)>) {
+    let step = spacing / (values.len() + 1) as f64;
+    // Without the steps that it must keep, the sequence has only to be nondecreasing within [0, 1 − spacing]:
     // isotonic regression by pooling adjacent violators. Clamping commutes with it.
     blocks.clear();
     for (i, &value) in values.iter().enumerate() {
-        let wanted = (value - (i + 1) as f64 * step).clamp(0.0, 1.0 - SPACING);
+        let wanted = (value - (i + 1) as f64 * step).clamp(0.0, 1.0 - spacing);
         let mut block = (wanted, 1);
         while let Some(&(mean, count)) = blocks.last() {
             if mean <= block.0 {
@@ -68,17 +70,21 @@ mod tests {
     use super::*;
 
     /// Smallest distance between neighbours, ends included, in units of the promised one.
-    fn smallest_gap(values: &[f64]) -> f64 {
+    fn smallest_gap(values: &[f64], spacing: f64) -> f64 {
         let ends = [0.0].iter().chain(values).zip(values.iter().chain(&[1.0]));
-        let promised = SPACING / (values.len() + 1) as f64;
+        let promised = spacing / (values.len() + 1) as f64;
         ends.map(|(a, b)| (b - a) / promised)
             .fold(f64::INFINITY, f64::min)
     }
 
     fn done(values: &[f64]) -> Vec<f64> {
+        with_room(values, SPACING)
+    }
+
+    fn with_room(values: &[f64], spacing: f64) -> Vec<f64> {
         let mut values = values.to_vec();
         fill(&mut values);
-        spread(&mut values, &mut Vec::new());
+        spread(&mut values, spacing, &mut Vec::new());
         values
     }
 
@@ -119,8 +125,10 @@ mod tests {
                 (0..n).map(|_| 1e3 * (random() - 0.5)).collect(),
             ];
             for case in cases {
-                let gap = smallest_gap(&done(&case));
-                assert!(gap > 0.99, "{n}: {gap}");
+                for spacing in [SPACING, SPACING_UNDER_GRID] {
+                    let gap = smallest_gap(&with_room(&case, spacing), spacing);
+                    assert!(gap > 0.99, "{n}: {gap}");
+                }
             }
         }
     }

@@ -353,7 +353,7 @@ fn threads_change_nothing() {
             .num_threads(threads)
             .build()
             .unwrap();
-        pool.install(|| positions(&x.intrinsic, &curves).unwrap())
+        pool.install(|| positions(&x.intrinsic, &curves, SPACING).unwrap())
     };
     assert_eq!(with(1), with(5));
 }
@@ -369,7 +369,10 @@ fn nonsense_is_survived() {
     let curves = x.curves();
     let mut short = curves.clone();
     short.first.pop();
-    assert_eq!(positions(&x.intrinsic, &short), Err(PositionsError::Sizes));
+    assert_eq!(
+        positions(&x.intrinsic, &short, SPACING),
+        Err(PositionsError::Sizes)
+    );
     let mut doubled = curves.clone();
     let twice = (0..curves.crossing.len())
         .find(|&i| (0..i).any(|j| curves.crossing[j].halfedge == curves.crossing[i].halfedge))
@@ -379,13 +382,13 @@ fn nonsense_is_survived() {
         .unwrap();
     doubled.crossing[twice].rank = doubled.crossing[first].rank;
     assert!(matches!(
-        positions(&x.intrinsic, &doubled),
+        positions(&x.intrinsic, &doubled, SPACING),
         Err(PositionsError::Ranks { .. })
     ));
     let mut flat = x.intrinsic.clone();
     flat.delaunay_length[EdgeId::new(3)] = 0.0;
     assert_eq!(
-        positions(&flat, &curves),
+        positions(&flat, &curves, SPACING),
         Err(PositionsError::Length {
             edge: 3,
             length: 0.0
@@ -403,7 +406,7 @@ fn nonsense_is_survived() {
     assert!(range.len() > 2);
     let (i, j) = (range.start, range.start + 1);
     astray.crossing.swap(i, j);
-    let got = positions(&x.intrinsic, &astray).unwrap();
+    let got = positions(&x.intrinsic, &astray, SPACING).unwrap();
     assert!(got.unmatched > 0 && got.unmatched <= range.len());
     promised(&x.intrinsic, &astray, &got);
 }

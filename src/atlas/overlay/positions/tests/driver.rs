@@ -166,7 +166,7 @@ impl Driver {
     /// Positions, after a check of everything that is promised.
     pub(super) fn checked(&self) -> (Curves, Positions) {
         let curves = self.curves();
-        let got = positions(&self.intrinsic, &curves).unwrap();
+        let got = positions(&self.intrinsic, &curves, SPACING).unwrap();
         assert_eq!(got.unmatched, 0);
         promised(&self.intrinsic, &curves, &got);
         (curves, got)
