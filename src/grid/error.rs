@@ -40,7 +40,7 @@ pub enum GridError {
     },
     /// The sides of an edge are not a quarter turn apart.
     #[error(
-        "both sides of edge {edge} are {gap:e} apart after a quarter turn: a grid needs flow.holonomy = \"quarter-turns\""
+        "both sides of edge {edge} of the refined surface are {gap:.1e} apart after a quarter turn, more than rounding leaves: faces there are too thin or too small for float64's 16 digits"
     )]
     NoQuarterTurn {
         /// Edge of the atlas.

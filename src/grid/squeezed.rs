@@ -36,15 +36,20 @@ pub(super) fn widen(
 ) {
     let mut squeezed = energy.above(SQUEEZED, place);
     let mut left = MOST_MOVES.1 + (MOST_MOVES.0 * c.vertex_count() as f64) as usize;
+    let (mut star, mut fan) = (Vec::new(), Vec::new());
     for _ in 0..MOST_ROUNDS {
         let mut touched = Vec::new();
         let mut vertices = distinct(squeezed.iter().flat_map(|&f| c.face_vertices(f)));
+        vertices.retain(|v| is_free[v.index()] != [false; 2]);
         vertices.truncate(left);
         left -= vertices.len();
         for v in vertices {
-            let star = distinct(c.outgoing(v).map(|h| c.face(h)));
-            if move_vertex(energy, &star, v, place, is_free[v.index()]) {
-                touched.extend(star);
+            star.clear();
+            star.extend(c.outgoing(v).map(|h| c.face(h)));
+            fan.clear();
+            fan.extend(star.iter().map(|&f| energy.around(f, v, place)));
+            if move_vertex(energy, &star, &fan, v, place, is_free[v.index()]) {
+                touched.extend_from_slice(&star);
             }
         }
         see(place);
@@ -64,23 +69,23 @@ fn distinct<T: Ord>(all: impl Iterator<Item = T>) -> Vec<T> {
     all
 }
 
-/// Takes a step of Newton's method with one vertex. Whether that gains much.
+/// Takes a step of Newton's method with one vertex; `fan` are the faces of its star. Whether that gains much.
 fn move_vertex(
     energy: &Energy,
     star: &[FaceId],
+    fan: &[Around],
     v: VertexId,
     place: &mut Places,
     is_free: [bool; 2],
 ) -> bool {
-    let fan: Vec<Around> = star.iter().map(|&f| energy.around(f, v, place)).collect();
-    let Some((step, slope)) = fan::newton_step(&fan, is_free) else {
+    let Some((step, slope)) = fan::newton_step(fan, is_free) else {
         return false;
     };
-    let mut length = (BEFORE_FLAT * fan::longest(&fan, step)).min(1.0);
-    let (from, before) = (place[v.index()], fan::energy(&fan, [0.0; 2]));
+    let mut length = (BEFORE_FLAT * fan::longest(fan, step)).min(1.0);
+    let (from, before) = (place[v.index()], fan::energy(fan, [0.0; 2]));
     for _ in 0..MOST_HALVINGS {
         let by = step.map(|x| length * x);
-        let there = fan::energy(&fan, by);
+        let there = fan::energy(fan, by);
         if there <= before + SUFFICIENT * length * slope {
             place[v.index()] = [0, 1].map(|i| from[i] + by[i]);
             // Rounded places may say otherwise.

@@ -1,6 +1,7 @@
 use super::*;
 use crate::geometry::connectivity::Connectivity;
 use crate::geometry::subdivision::Corner;
+use crate::grid::triangle::double_area;
 
 /// A surface that lies in the plane as it is.
 fn plane(places: &[[f64; 2]], faces: &[[u32; 3]], near: f64) -> Sheet {
