@@ -3,7 +3,7 @@
 mod existence;
 
 use super::flatten::{prepared_at_first, prescribed};
-use super::listing::{self, counted};
+use super::listing::{self, MOST_LISTED, counted, left_out};
 use super::{BuildError, refine_for, shares};
 use crate::atlas::patch::Domain;
 use crate::config::Config;
@@ -58,24 +58,27 @@ pub fn inspect(path: &Path, config: &Config) -> Result<Inspection, BuildError> {
     let (requests, of_flat) = (assigned(config)?, assigned(otherwise)?);
     let mut text = String::new();
     let count = repaired.components.len();
-    let mut line = |s: String| {
+    let mut whole = |s: String| {
         let _ = writeln!(text, "{s}");
     };
-    line(format!(
+    whole(format!(
         "{}, {}, {}",
         counted(soup.positions.len(), "vertex", "vertices"),
         counted(soup.faces.len(), "triangle", "triangles"),
         counted(count, "component", "components")
     ));
     for note in &asset.notes {
-        line(format!("note: {note}"));
+        whole(format!("note: {note}"));
     }
-    let (mut failures, mut regions) = (Vec::new(), Vec::new());
+    let (mut failures, mut regions, mut others) = (Vec::new(), Vec::new(), 0);
     let shares = shares::shares(&repaired.components);
     let parts = repaired.components.into_iter().zip(shares);
     let parts = parts.zip(requests.into_iter().zip(of_flat));
     for (i, ((component, share), (requests, of_flat))) in parts.enumerate() {
         let config = &shares::of_share(config, share)?;
+        let mut of_part = Vec::new();
+        let mut is_listed = i < MOST_LISTED;
+        let mut line = |s: String| of_part.push(s);
         if count > 1 {
             line(format!("component {i}:"));
         }
@@ -96,15 +99,24 @@ pub fn inspect(path: &Path, config: &Config) -> Result<Inspection, BuildError> {
         let mut planned = plan(component, &requests, config, &mut line, &mut offend);
         if let (Err(error), Domain::Grid, Ok(_)) = (&planned, config.domain(), &again.mesh) {
             line(format!("  no grid, but flat patches: {error}"));
+            is_listed = true;
             planned = plan(again, &of_flat, otherwise, &mut line, &mut offend);
         }
         match planned {
             Ok(()) => {}
             Err(error) => {
                 line(format!("  refused: {error}"));
+                is_listed = true;
                 failures.push(Failure::from(&error));
             }
         }
+        match is_listed {
+            true => of_part.into_iter().for_each(&mut whole),
+            false => others += 1,
+        }
+    }
+    if others > 0 {
+        whole(left_out(others));
     }
     Ok(Inspection {
         text,

@@ -10,6 +10,15 @@ const LISTED: usize = 12;
 /// Longer curvatures are rounded.
 const SHORT: usize = 7;
 
+/// Components of a file that are listed whatever there is to say of them.
+pub(super) const MOST_LISTED: usize = 16;
+
+/// The line that stands for those that are not listed.
+pub(super) fn left_out(components: usize) -> String {
+    let more = counted(components, "more component", "more components");
+    format!("{more}: nothing refused, and a grid wherever one is asked for")
+}
+
 /// A count with its noun.
 pub(super) fn counted(count: usize, one: &str, several: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { several })

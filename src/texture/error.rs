@@ -6,7 +6,7 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 pub enum ExemplarError {
     /// The file cannot be read.
-    #[error("the pattern {} cannot be read: {source}", path.display())]
+    #[error("the pattern {} cannot be read: {source}; give a {FORMATS} file that is there", path.display())]
     Io {
         /// The file.
         path: PathBuf,

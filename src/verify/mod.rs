@@ -39,7 +39,7 @@ mod transitions;
 
 use crate::read::bounded::{JSON_LIMIT, is_inside, read_bounded};
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -105,7 +105,10 @@ pub struct Check {
     pub figure: String,
 }
 
-/// All checks of one run. `Display` gives a line a check and a total.
+/// Folders that may have a line each for a check that they pass.
+const MOST_LINES: usize = 16;
+
+/// All checks of one run. `Display` gives a line a check and a total; a check that more than 16 folders pass has one line for all of them.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Verdicts {
     /// In the order in which they ran.
@@ -123,6 +126,7 @@ impl Verdicts {
         !self.checks.is_empty() && self.failed() == 0
     }
 
+    /// `name` has no `: `, which divides it from the folder.
     fn note(&mut self, name: &str, passed: bool, figure: impl fmt::Display) -> bool {
         self.checks.push(Check {
             name: name.to_owned(),
@@ -140,9 +144,29 @@ impl Verdicts {
     }
 }
 
+impl Check {
+    /// Its name without the folders before it.
+    fn bare_name(&self) -> &str {
+        let name = self.name.as_str();
+        name.rsplit_once(": ").map_or(name, |(_, bare)| bare)
+    }
+}
+
 impl fmt::Display for Verdicts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut passed_by: HashMap<&str, usize> = HashMap::new();
+        for check in self.checks.iter().filter(|check| check.passed) {
+            *passed_by.entry(check.bare_name()).or_default() += 1;
+        }
+        let mut is_told: HashSet<&str> = HashSet::new();
         for check in &self.checks {
+            let bare = check.bare_name();
+            if check.passed && passed_by[bare] > MOST_LINES {
+                if is_told.insert(bare) {
+                    writeln!(f, "ok    {bare}  in {} folders", passed_by[bare])?;
+                }
+                continue;
+            }
             let verdict = if check.passed { "ok    " } else { "FAIL  " };
             let gap = if check.figure.is_empty() { "" } else { "  " };
             writeln!(f, "{verdict}{}{gap}{}", check.name, check.figure)?;
@@ -402,4 +426,33 @@ fn of(check: impl FnOnce(&mut Verdicts)) -> Verdicts {
     let mut verdicts = Verdicts::default();
     check(&mut verdicts);
     verdicts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_check_that_many_folders_pass_has_one_line() {
+        let text = |folders: usize, bad: Option<usize>| {
+            let mut all = Verdicts::default();
+            for i in 0..folders {
+                let mut one = Verdicts::default();
+                one.note("finite", bad != Some(i), "");
+                all.append(&format!("component-{i:03}"), one);
+            }
+            all.note("bounding box", true, "0.1");
+            all.to_string()
+        };
+        assert_eq!(text(MOST_LINES, None).lines().count(), MOST_LINES + 2);
+        let many = text(MOST_LINES + 3, Some(1));
+        let lines: Vec<&str> = many.lines().collect();
+        let expected = [
+            "ok    finite  in 18 folders",
+            "FAIL  component-001: finite",
+            "ok    bounding box  0.1",
+            "19 passed, 1 failed",
+        ];
+        assert_eq!(lines, expected);
+    }
 }

@@ -493,8 +493,8 @@ fn texture_without_a_folder_or_a_pattern() {
     // The pattern is read before the atlas.
     std::fs::create_dir(folder.path().join("atlas")).expect("created");
     std::fs::write(folder.path().join("atlas/atlas.json"), "{}").expect("written");
-    insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @"failed: atlas (input): the pattern a.png cannot be read: No such file or directory (os error 2)");
-    insta::assert_snapshot!(texture(&["atlas", "-p", "empty"], 1), @"failed: atlas (input): the pattern empty cannot be read: it is no regular file");
+    insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @"failed: atlas (input): the pattern a.png cannot be read: No such file or directory (os error 2); give a PNG or JPEG file that is there");
+    insta::assert_snapshot!(texture(&["atlas", "-p", "empty"], 1), @"failed: atlas (input): the pattern empty cannot be read: it is no regular file; give a PNG or JPEG file that is there");
     std::fs::write(folder.path().join("a.png"), "no image").expect("written");
     insta::assert_snapshot!(texture(&["atlas", "-p", "a.png"], 1), @"failed: atlas (input): the pattern a.png is no image that can be read (Format error decoding Png: Invalid PNG signature.); give a PNG or JPEG file");
     std::fs::write(

@@ -228,3 +228,63 @@ fn few_components_have_pages_of_their_own_beside_that_of_all() {
     assert!(page.contains("<td data-value=\"1\">component-001</td><td colspan=\"10\""));
     assert!(asset.join("preview.png").is_file());
 }
+
+/// A Möbius strip of five triangles as one more component.
+fn one_sided(text: &mut String, first: usize) {
+    for (x, y, z) in [(0, 0, 0), (4, 0, 1), (5, 3, 2), (2, 5, 1), (-1, 3, 3)] {
+        writeln!(text, "v {x} {y} {}", z + 50).expect("a string");
+    }
+    for i in 0..5 {
+        let [a, b, c] = [i, (i + 1) % 5, (i + 2) % 5].map(|k| first + k);
+        writeln!(text, "f {a} {b} {c}").expect("a string");
+    }
+}
+
+#[test]
+fn of_many_components_little_is_said_but_of_those_that_are_refused() {
+    let input = tempfile::tempdir().expect("a temporary folder");
+    let mesh = input.path().join("boxes.obj");
+    let mut text = boxes(&[1.0; 20]);
+    one_sided(&mut text, 8 * 20 + 1);
+    std::fs::write(&mesh, text).expect("written");
+    let said = |args: &[&Path]| {
+        let output = program().args(args).output().expect("the program starts");
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let listed = |said: &str| {
+        let numbers = said.lines().filter_map(|line| {
+            let number = line
+                .strip_prefix("component")?
+                .trim_matches([' ', '-', ':']);
+            number.parse::<usize>().ok()
+        });
+        numbers.collect::<Vec<_>>()
+    };
+    let first: Vec<usize> = (0..16).collect();
+    for command in ["check", "explain"] {
+        let said = said(&[Path::new(command), &mesh]);
+        assert_eq!(listed(&said), [first.as_slice(), &[20]].concat(), "{said}");
+        let end = "4 more components: nothing refused, and a grid wherever one is asked for";
+        assert_eq!(said.lines().last(), Some(end), "{command}");
+    }
+    let built = build(&mesh, &["report.enabled=false"]);
+    let asset = built.folder.path().join("boxes");
+    let of_folder = said(&[Path::new("explain"), &asset]);
+    assert_eq!(listed(&of_folder), first, "{of_folder}");
+    let end = "4 more components: explain OUT/ASSET/component-NNN tells of one";
+    assert_eq!(of_folder.lines().last(), Some(end));
+    let one = said(&[Path::new("explain"), &asset.join("component-019")]);
+    assert!(one.contains("cones: lengths are scaled by"), "{one}");
+
+    let array = asset.join("component-018/atlas.npz");
+    std::fs::remove_file(array).expect("removed");
+    let (passed, said) = verify(&asset);
+    assert!(
+        !passed && said.contains("ok    format  in 20 folders\n"),
+        "{said}"
+    );
+    let failed: Vec<&str> = said.lines().filter(|l| l.starts_with("FAIL")).collect();
+    assert_eq!(failed.len(), 2, "{said}");
+    assert!(failed[0].starts_with("FAIL  component-018: atlas.npz can be read  "));
+    assert!(failed[1].contains("names component 18, of which there is no sound atlas"));
+}

@@ -166,8 +166,8 @@ impl Staging {
             registry,
             output_root: output_root.to_owned(),
             target,
+            syncing: Syncing::new(&path),
             path,
-            syncing: Syncing::default(),
         })
     }
 
@@ -239,8 +239,9 @@ impl Staging {
 
     /// Puts the folder in place. On an error the older folder is where it was.
     pub fn publish(self) -> Result<(), ExportError> {
-        self.syncing.wait()?;
-        sync_folders(&self.path).map_err(ExportError::io(Action::Publish, &self.target))?;
+        if !self.syncing.wait(&self.target)? {
+            sync_folders(&self.path).map_err(ExportError::io(Action::Publish, &self.target))?;
+        }
         {
             let _state = self.registry.lock_open()?;
             check_target(self.contents, &self.target)?;

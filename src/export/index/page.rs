@@ -60,8 +60,9 @@ fn counts(body: &mut String, assets: &[Asset<'_>]) {
     let seconds: f64 = assets.iter().map(|a| a.record.seconds).sum();
     let _ = writeln!(
         body,
-        "<p>{} assets, {} of work together.</p>\n<div class=\"counts\" role=\"group\" aria-label=\"Show assets by state\">",
+        "<p>{} asset{}, {} of work together.</p>\n<div class=\"counts\" role=\"group\" aria-label=\"Show assets by state\">",
         assets.len(),
+        if assets.len() == 1 { "" } else { "s" },
         duration(seconds)
     );
     let _ = writeln!(

@@ -11,7 +11,7 @@ mod failure;
 mod turns;
 
 use super::flatten::{Flattened, flatten, prepared_at_first, prescribed};
-use super::listing::counted;
+use super::listing::{MOST_LISTED, counted, left_out};
 use super::{BuildError, shares};
 use crate::atlas::patch::Domain;
 use crate::config::Config;
@@ -49,6 +49,15 @@ impl Explanation {
     pub fn glb(&self) -> Option<Result<Vec<u8>, ExportError>> {
         let any = self.surfaces.iter().any(Marked::has_marks);
         any.then(|| marked::encode(&self.surfaces))
+    }
+
+    /// The line that begins a component, where there are several, and by what its others are indented.
+    fn head(&mut self, name: &str, count: usize) -> &'static str {
+        if count == 1 {
+            return "";
+        }
+        self.lines.push(format!("{name}:"));
+        "  "
     }
 
     fn say(&mut self, indent: &str, lines: Vec<String>) {
@@ -113,22 +122,20 @@ pub fn mesh(path: &Path, config: &Config) -> Result<Explanation, BuildError> {
     let shares = shares::shares(&repaired.components);
     let parts = repaired.components.into_iter().zip(shares);
     let parts = parts.zip(requests.into_iter().zip(of_flat));
+    let mut others = 0;
     for (i, ((component, share), (requests, of_flat))) in parts.enumerate() {
         let config = &shares::of_share(config, share)?;
         let name = format!("component {i}");
-        let indent = match count {
-            1 => "",
-            _ => {
-                explanation.lines.push(format!("{name}:"));
-                "  "
-            }
-        };
+        let before = explanation.lines.len();
+        let mut is_listed = i < MOST_LISTED;
+        let indent = explanation.head(&name, count);
         let flattened = match config.domain() {
             Domain::Flat => flat(component, &requests, config),
             // As a build does.
             Domain::Grid => flat(component.clone(), &requests, config).or_else(|error| {
                 let flattened = flat(component, &of_flat, otherwise)?;
                 explanation.say(indent, vec![format!("no grid: {error}")]);
+                is_listed = true;
                 Ok(flattened)
             }),
         };
@@ -139,8 +146,18 @@ pub fn mesh(path: &Path, config: &Config) -> Result<Explanation, BuildError> {
                 explanation.say(indent, turns);
                 explanation.surfaces.push(surface);
             }
-            Err(error) => explanation.refuse(indent, name, &error, soup),
+            Err(error) => {
+                explanation.refuse(indent, name, &error, soup);
+                is_listed = true;
+            }
         }
+        if !is_listed {
+            explanation.lines.truncate(before);
+            others += 1;
+        }
+    }
+    if others > 0 {
+        explanation.lines.push(left_out(others));
     }
     Ok(explanation)
 }
@@ -183,19 +200,22 @@ pub fn folder(folder: &Path) -> Result<Explanation, FolderError> {
                 |name| name.to_string_lossy().into_owned(),
             ),
         };
-        let indent = match count {
-            1 => "",
-            _ => {
-                explanation.lines.push(format!("{name}:"));
-                "  "
-            }
-        };
+        let before = explanation.lines.len();
+        let indent = explanation.head(&name, count);
         let stored = read_metric(&path)?;
         let turns = stored.turns.as_ref().map_or_else(Vec::new, turns::describe);
         let (lines, surface) = Flat::stored(stored).explain(name);
         explanation.say(indent, lines);
         explanation.say(indent, turns);
         explanation.surfaces.push(surface);
+        if i >= MOST_LISTED {
+            explanation.lines.truncate(before);
+        }
+    }
+    if let Some(others) = count.checked_sub(MOST_LISTED).filter(|n| *n > 0) {
+        let more = counted(others, "more component", "more components");
+        let how = "explain OUT/ASSET/component-NNN tells of one";
+        explanation.lines.push(format!("{more}: {how}"));
     }
     Ok(explanation)
 }
