@@ -1,6 +1,6 @@
 //! What became of an asset: what a job tells the command line and the manifest.
 
-use crate::export::folder::list_files;
+use crate::export::folder::{COMPONENTS, list_files};
 use crate::product::AffineAtlas;
 use serde::{Deserialize, Serialize, Serializer};
 use std::path::{Path, PathBuf};
@@ -183,7 +183,8 @@ impl AssetOutcome {
         if !new {
             self.files = list_files(&output.join(&self.id)).unwrap_or_default();
             // A folder of something else is not replaced, but nor is it a result.
-            self.kept = self.files.iter().any(|file| file.ends_with("atlas.json"));
+            let is_of_atlas = |file: &String| file.ends_with("atlas.json") || file == COMPONENTS;
+            self.kept = self.files.iter().any(is_of_atlas);
         }
     }
 

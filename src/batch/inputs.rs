@@ -13,6 +13,7 @@
 //! The output root is never searched. Links to folders are not followed, so that no search is without end.
 
 use crate::config::assets::Input;
+use crate::export::folder::COMPONENTS;
 use crate::read::EXTENSIONS;
 use crate::read::bounded::read_bounded;
 use std::collections::HashSet;
@@ -20,8 +21,10 @@ use std::fs;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
-/// Bytes at the start of `atlas.json` that say whose it is.
-const START: u64 = 256;
+/// What folders of results hold.
+const DOCUMENTS: [&str; 4] = ["atlas.json", COMPONENTS, "fit.json", "texture.json"];
+/// Bytes at the start of such a file that say whose it is.
+const START: u64 = 1 << 16;
 
 /// What the entries mean.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -295,13 +298,13 @@ fn is_result(entry: &fs::DirEntry) -> bool {
     let (name, path) = (entry.file_name(), entry.path());
     let document = match name.to_string_lossy().starts_with("component-") {
         true => path.join("atlas.json"),
-        false if name == "atlas.json" => path,
+        false if DOCUMENTS.iter().any(|document| name == *document) => path,
         false => return false,
     };
     // Other programs have files of this name.
     let mut start = Vec::new();
     let read = fs::File::open(document).and_then(|file| file.take(START).read_to_end(&mut start));
-    read.is_ok() && String::from_utf8_lossy(&start).contains("\"format\": \"affine-atlas\"")
+    read.is_ok() && String::from_utf8_lossy(&start).contains("\"format\": \"affine-atlas")
 }
 
 fn is_mesh(path: &Path) -> bool {
@@ -484,9 +487,18 @@ mod tests {
             "c/atlas.json",
             "c/c.glb",
             "d/component-001/d.obj",
+            "e.fit/fit.json",
+            "e.fit/e.glb",
+            "e.texture/texture.json",
+            "e.texture/e.glb",
         ]);
-        for result in ["a/atlas.json", "b/component-002/atlas.json"] {
-            let text = "{\n  \"format\": \"affine-atlas\",";
+        for (result, format) in [
+            ("a/atlas.json", ""),
+            ("b/component-002/atlas.json", ""),
+            ("e.fit/fit.json", "-fit"),
+            ("e.texture/texture.json", "-texture"),
+        ] {
+            let text = format!("{{\n  \"format\": \"affine-atlas{format}\",");
             fs::write(root.path().join(result), text).unwrap();
         }
         assert_eq!(

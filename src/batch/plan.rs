@@ -285,7 +285,7 @@ impl Plan {
                 let mut config = settings.config.clone();
                 // What concerns the whole run is in tasks and header.
                 config.input = Default::default();
-                config.output = Default::default();
+                config.output = config.output.anywhere();
                 let one = Configuration {
                     config_hash: settings.hash.clone(),
                     cone_lines: config.cones.file_lines.clone(),

@@ -107,7 +107,7 @@ impl Process {
         let is_share = config.run.memory == Limit::Auto;
         // Paths need not be Unicode, and the worker has its own as arguments. Cones and features are in their lists already.
         config.input = Default::default();
-        config.output = Default::default();
+        config.output = config.output.anywhere();
         let files = [&mut config.cones.file, &mut config.features.file];
         for file in files.into_iter().flatten() {
             *file = file.to_string_lossy().into_owned().into();

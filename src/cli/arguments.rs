@@ -374,7 +374,7 @@ pub struct Verify {
     /// Compare with the mesh the atlas was made from
     #[arg(long, value_name = "MESH")]
     pub source: Option<PathBuf>,
-    /// Require this number of cones in each component
+    /// Refuse components with more cones than this
     #[arg(long, value_name = "N")]
     pub cones: Option<usize>,
 }
@@ -524,6 +524,8 @@ pub struct Schema {
 pub enum SchemaOf {
     /// atlas.json
     Atlas,
+    /// components.json
+    Components,
     /// a line of manifest.jsonl
     Manifest,
     /// config.toml

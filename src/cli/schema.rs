@@ -9,6 +9,7 @@ use affine_atlas::schema;
 pub fn run(asked: &Schema) -> Result<u8, Problem> {
     let schema = match asked.of {
         SchemaOf::Atlas => schema::atlas(),
+        SchemaOf::Components => schema::components(),
         SchemaOf::Manifest => schema::manifest(),
         SchemaOf::Config => schema::config(),
         SchemaOf::Plan => schema::plan(),

@@ -1,5 +1,6 @@
 //! What became of every asset, in one line each.
 
+use affine_atlas::export::folder::component_name;
 use affine_atlas::outcome::{AssetOutcome, ComponentOutcome, Summary};
 use console::{measure_text_width, style, truncate_str};
 use std::path::Path;
@@ -210,6 +211,8 @@ fn rows(outcome: &AssetOutcome) -> Vec<Row> {
 
 /// Sums over components, and the worst of their errors.
 fn together(components: &[ComponentOutcome]) -> Option<Summary> {
+    let first = components.iter().find(|c| c.result.is_ok())?;
+    let has_folder = |of: &Summary| of.folder.ends_with(component_name(first.index));
     let built = components.iter().filter_map(|c| c.result.as_ref().ok());
     let sum = built.cloned().reduce(|a, b| Summary {
         vertices: a.vertices + b.vertices,
@@ -222,11 +225,11 @@ fn together(components: &[ComponentOutcome]) -> Option<Summary> {
         area_distortion: a.area_distortion.max(b.area_distortion),
         folder: a.folder,
     })?;
-    let of_asset = sum.folder.parent().map(Path::to_owned);
-    Some(Summary {
-        folder: of_asset.unwrap_or_default(),
-        ..sum
-    })
+    let folder = match has_folder(&sum) {
+        true => sum.folder.parent().map(Path::to_owned).unwrap_or_default(),
+        false => sum.folder.clone(),
+    };
+    Some(Summary { folder, ..sum })
 }
 
 fn row(

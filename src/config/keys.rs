@@ -201,6 +201,15 @@ pub const KEYS: &[Key] = &[
     key("input.paths", Kind::Texts, "", "[]"),
     key("output.folder", Kind::Text, "", "\"affine-atlas-out\""),
     key(
+        "output.component_folders",
+        Kind::Integer {
+            min: 0,
+            max: 1_000_000,
+        },
+        "components",
+        "256",
+    ),
+    key(
         "limits.max_vertices",
         Kind::Integer {
             min: 3,

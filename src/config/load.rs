@@ -74,7 +74,7 @@ impl Loaded {
         self.files
             .extend(read_features(&mut config, &self.features_base)?);
         config.input = self.config.input.clone();
-        config.output = self.config.output.clone();
+        config.output.folder.clone_from(&self.config.output.folder);
         Ok(config)
     }
 }

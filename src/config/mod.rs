@@ -113,7 +113,7 @@ impl Config {
             cones,
             features,
             input: InputParams::default(),
-            output: OutputParams::default(),
+            output: own.output.anywhere(),
             run: RunParams::default(),
             preset: None,
             asset: Vec::new(),

@@ -219,7 +219,7 @@ run.timeout = 7
             ),
             (
                 "[[asset]]\nglob = \"*\"\noutput.folder = \"x\"",
-                "f:3:1: `output` concerns the whole run and not single meshes",
+                "f:3:8: `output.folder` concerns the whole run and not single meshes",
             ),
             (
                 "[[asset]]\nglob = \"*\"\ncones.list = [{ vertex = 1 }]",

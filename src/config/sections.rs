@@ -32,12 +32,32 @@ pub struct OutputParams {
     /// Folder that receives one folder an asset; a relative one starts at the folder of the
     /// configuration file.
     pub folder: PathBuf,
+    /// Most components of an asset that get a folder each; where there are more, only files of all of them are written.
+    pub component_folders: usize,
+}
+
+impl OutputParams {
+    /// The same wherever the output goes: what can change a byte of it.
+    #[must_use]
+    pub fn anywhere(&self) -> Self {
+        Self {
+            folder: Self::default().folder,
+            ..self.clone()
+        }
+    }
+
+    /// Whether each component of an asset of so many gets a folder. A single one is the asset.
+    #[must_use]
+    pub fn has_component_folders(&self, components: usize) -> bool {
+        components <= self.component_folders.max(1)
+    }
 }
 
 impl Default for OutputParams {
     fn default() -> Self {
         Self {
             folder: PathBuf::from("affine-atlas-out"),
+            component_folders: 256,
         }
     }
 }

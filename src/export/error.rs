@@ -105,6 +105,16 @@ pub enum ExportError {
         /// Where in the files the number would have gone.
         place: String,
     },
+    /// Components that share no file, and have no folders.
+    #[error(
+        "32-bit floats do not hold the {components} components together, and more than {most} get no folders; set output.component_folders = {components}"
+    )]
+    TooFarApart {
+        /// How many there are.
+        components: usize,
+        /// How many may have folders.
+        most: usize,
+    },
     /// A coordinate does not fit the single precision of images and glTF.
     #[error(
         "vertex {vertex} has the coordinate {coordinate:e}, beyond the {limit:e} that images and glTF can hold; scale the model down", limit = f32::MAX

@@ -4,7 +4,7 @@
 //! ids; the file is replaced in one step, so that a reader never meets half a line.
 
 use crate::export::{Action, ExportError, folder, names};
-use crate::outcome::{AssetOutcome, AssetState, FailureKind};
+use crate::outcome::{AssetOutcome, AssetState, ComponentOutcome, FailureKind};
 use crate::read::bounded::{JSON_LIMIT, open_regular, read_bounded};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -72,19 +72,24 @@ pub struct ComponentRecord {
     pub error: Option<String>,
 }
 
+impl ComponentRecord {
+    /// What is said of a component that a job has finished with.
+    pub fn of(outcome: &ComponentOutcome) -> Self {
+        let failure = outcome.result.as_ref().err();
+        Self {
+            component: outcome.index,
+            state: failure.map_or(State::Built, |_| State::Failed),
+            kind: failure.map(|f| f.kind),
+            error: failure.map(|f| f.message.clone()),
+        }
+    }
+}
+
 impl Record {
     /// The line of an asset that a job has finished with.
     pub fn of(outcome: &AssetOutcome, config_hash: &str) -> Record {
         let failure = outcome.failures().next().map(|(_, failure)| failure);
-        let components = outcome.components.iter().map(|c| {
-            let failure = c.result.as_ref().err();
-            ComponentRecord {
-                component: c.index,
-                state: failure.map_or(State::Built, |_| State::Failed),
-                kind: failure.map(|f| f.kind),
-                error: failure.map(|f| f.message.clone()),
-            }
-        });
+        let components = outcome.components.iter().map(ComponentRecord::of);
         Record {
             id: outcome.id.clone(),
             input_hash: outcome.input_hash.clone(),

@@ -11,6 +11,7 @@
 //! its arrays fit each other and its numbers are finite.
 
 pub mod atlas_json;
+pub mod components;
 mod error;
 pub mod exr;
 pub mod fit;

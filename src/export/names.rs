@@ -6,6 +6,8 @@ use super::error::ExportError;
 pub(super) const INDEX: &str = "index.html";
 /// What the next run compares with.
 pub(super) const HISTORY: &str = "history.jsonl";
+/// The components of an asset, where they have no folders.
+pub(crate) const COMPONENTS: &str = "components.json";
 /// The record of the latest run.
 pub(super) const MANIFEST: &str = "manifest.jsonl";
 /// The picture that stands for a component.

@@ -5,7 +5,8 @@
 //! triangulation stays Delaunay.
 //!
 //! The faces that a line crosses are laid out in the plane, where they make a polygon with the line as a diagonal. An edge across the line is flipped where the quad around it is
-//! convex, until none is left (Sloan 1993).
+//! convex, until none is left; then those that do not cross it are flipped until they are Delaunay (Sloan 1993). Flips that make faces with corners nearly on one line wait for others: there are such corners
+//! wherever borders are straight, and from the lengths of such a face no angle can be told.
 
 use super::correspondence::{CorrespondenceError, Crossing, Followed};
 use super::delaunay::Delaunay;
@@ -13,8 +14,12 @@ use crate::geometry::connectivity::{Connectivity, Flip};
 use crate::geometry::ids::{EdgeId, FaceId, FaceVec, HalfedgeId};
 use std::collections::VecDeque;
 
-/// Double area of a face, by the square of the longer diagonal, below which a flip that makes it waits for others: corners on one line have one that is rounding.
-const FLAT: f64 = 1e-12;
+/// Double areas of a face, by the square of the longer diagonal, below which a flip that makes it waits for others, one after the other: corners on one line have one that is rounding, or
+/// the little by which the metric is not there yet, and from the lengths of such a face no angle can be told.
+const FLAT: [f64; 7] = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 0.0];
+
+/// Part of the square of both diagonals that the corners of a quad may be off one circle.
+const ROUNDING: f64 = 1e-10;
 
 /// A flip that keeps the metric, and how the new length depends on the old ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -202,49 +207,101 @@ impl Strip {
 
     /// Flips until no edge crosses the line; the edge that the line has become.
     fn clear(&mut self, flat: &mut Delaunay, flips: &mut Vec<EuclidFlip>) -> Option<EdgeId> {
-        let mut left_over = 8 * self.crossed.len() * self.crossed.len() + 8;
-        let (mut line, mut refused) = (None, 0);
+        let mut left_over = 8 * FLAT.len() * (self.crossed.len() + 1).pow(2);
+        let (mut line, mut level, mut tried) = (None, 0, 0);
+        let mut beside = VecDeque::new();
         while let Some((edge, corners)) = self.crossed.pop_front() {
             left_over = left_over.checked_sub(1)?;
+            // All that are left were looked at, and as many cross the line as before.
+            if tried > self.crossed.len() && level + 1 < FLAT.len() {
+                (level, tried) = (level + 1, 0);
+            }
+            tried += 1;
             let [a, b] = corners;
             let (above, below) = self.beside(a, b)?;
             let [c, d] = [above.1, below.1];
             let quad = [a, b, c, d].map(|at| self.place[at]);
-            let least = if refused > self.crossed.len() {
-                0.0
-            } else {
-                FLAT
-            };
-            let Some(by) = derivatives(quad, least) else {
+            let Some(by) = derivatives(quad, FLAT[level]) else {
                 self.crossed.push_back((edge, corners));
-                refused += 1;
                 continue;
             };
-            refused = 0;
-            let length = distance(quad[2], quad[3]).ln() + self.log_unit;
-            let flip = flat.flip_to(edge, length)?;
-            let k = &flat.connectivity;
-            flips.push(EuclidFlip {
-                flip,
-                edge,
-                outer: flip.moves.map(|(_, to)| k.edge(to)),
-                by,
-            });
-            self.faces[above.0] = [d, c, a];
-            self.faces[below.0] = [c, d, b];
-            let corners = match k.edge_halfedge(edge) == flip.h {
-                true => [d, c],
-                false => [c, d],
-            };
-            match [c, d].map(|at| self.side[at]) {
+            let corners = self.flip(flat, edge, [a, b, c, d], [above.0, below.0], by, flips)?;
+            let sides = corners.map(|at| self.side[at]);
+            if let [Side::Left, Side::Right] | [Side::Right, Side::Left] = sides {
+                self.crossed.push_back((edge, corners));
+                continue;
+            }
+            (level, tried) = (0, 0);
+            match sides {
                 [Side::On, Side::On] => line = Some(edge),
-                [Side::Left, Side::Right] | [Side::Right, Side::Left] => {
-                    self.crossed.push_back((edge, corners));
-                }
-                _ => {}
+                _ => beside.push_back((edge, corners)),
             }
         }
+        self.improve(flat, beside, flips)?;
         line
+    }
+
+    /// Flips edges that are not Delaunay, `beside` and what is inside the polygon around them; the line stays.
+    fn improve(
+        &mut self,
+        flat: &mut Delaunay,
+        mut beside: VecDeque<(EdgeId, [usize; 2])>,
+        flips: &mut Vec<EuclidFlip>,
+    ) -> Option<()> {
+        let count = beside.len();
+        let mut left_over = 8 * (count + 1).pow(2);
+        let mut settled = 0;
+        // Once round without a flip.
+        while settled < count && left_over > 0 {
+            left_over -= 1;
+            settled += 1;
+            let Some((edge, [a, b])) = beside.pop_front() else {
+                break;
+            };
+            let (above, below) = self.beside(a, b)?;
+            let corners = [a, b, above.1, below.1];
+            let quad = corners.map(|at| self.place[at]);
+            let by = match is_delaunay(quad) {
+                true => None,
+                false => derivatives(quad, 0.0),
+            };
+            let ends = match by {
+                None => [a, b],
+                Some(by) => {
+                    settled = 0;
+                    self.flip(flat, edge, corners, [above.0, below.0], by, flips)?
+                }
+            };
+            beside.push_back((edge, ends));
+        }
+        Some(())
+    }
+
+    /// Flips an edge from a to b with c on its left and d on its right, in two faces; the corners that its halfedge runs between then.
+    fn flip(
+        &mut self,
+        flat: &mut Delaunay,
+        edge: EdgeId,
+        [a, b, c, d]: [usize; 4],
+        [above, below]: [usize; 2],
+        by: [f64; 5],
+        flips: &mut Vec<EuclidFlip>,
+    ) -> Option<[usize; 2]> {
+        let length = distance(self.place[c], self.place[d]).ln() + self.log_unit;
+        let flip = flat.flip_to(edge, length)?;
+        let k = &flat.connectivity;
+        flips.push(EuclidFlip {
+            flip,
+            edge,
+            outer: flip.moves.map(|(_, to)| k.edge(to)),
+            by,
+        });
+        self.faces[above] = [d, c, a];
+        self.faces[below] = [c, d, b];
+        Some(match k.edge_halfedge(edge) == flip.h {
+            true => [d, c],
+            false => [c, d],
+        })
     }
 
     /// The faces left and right of the way from a to b, with the corners opposite.
@@ -280,6 +337,17 @@ fn distance(p: [f64; 2], q: [f64; 2]) -> f64 {
 /// Twice the signed area.
 fn area([p, q, r]: [[f64; 2]; 3]) -> f64 {
     (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+}
+
+/// Whether the angles at c, on the left of the way from a to b, and d, on the right, are half a turn together at most, but for rounding.
+fn is_delaunay([a, b, c, d]: [[f64; 2]; 4]) -> bool {
+    let dot = |p: [f64; 2], [q, r]: [[f64; 2]; 2]| {
+        (q[0] - p[0]) * (r[0] - p[0]) + (q[1] - p[1]) * (r[1] - p[1])
+    };
+    let (above, below) = (area([a, b, c]), area([b, a, d]));
+    let sine = dot(c, [a, b]) * below + dot(d, [a, b]) * above;
+    let size = distance(a, b) * distance(c, d);
+    sine >= -ROUNDING * size * size
 }
 
 /// ∂ ln l_dc / ∂ ln l of ab, ca, ad, db, bc for c on the left of ab and d on the right; `None` where the quad is not strictly convex, or a face of the other diagonal smaller than `least`.
@@ -333,7 +401,7 @@ mod tests {
             let d = apex([ends[1], ends[0]], [ab, ad], db).unwrap();
             distance(c, d).ln()
         };
-        let by = derivatives(quad, FLAT).unwrap();
+        let by = derivatives(quad, FLAT[1]).unwrap();
         for k in 0..5 {
             let h = 1e-6;
             let at = |h: f64| {
@@ -351,7 +419,7 @@ mod tests {
         assert_eq!(derivatives([a, b, c, [3.0, 0.2]], 0.0), None);
         // The corners a, c and d on one line but for rounding: the flip would make a face of them.
         let on_line = [[0.0, 1e-13], [2.0, 0.1], [0.5, 1.0], [-0.5, -1.0]];
-        assert_eq!(derivatives(on_line, FLAT), None);
+        assert_eq!(derivatives(on_line, FLAT[5]), None);
         assert!(derivatives(on_line, 0.0).is_some());
     }
 }

@@ -20,6 +20,10 @@ use crate::observe::part;
 const MOST_STEPS: usize = 40;
 /// It ends where a step lowers the energy by less than this part.
 const LEAST_GAIN: f64 = 1e-4;
+/// It ends, too, where so many steps together …
+const SEVERAL: usize = 5;
+/// … lower the energy by less than this part: where a surface is thinner than a cell, each step ends at a face that it would turn over, and gains little for as long as there are more.
+const LEAST_GAIN_OF_SEVERAL: f64 = 1e-2;
 /// A step of less than this part of its length was stopped by squeezed faces.
 const SHORT: f64 = 0.5;
 
@@ -61,6 +65,7 @@ pub(crate) fn relax(map: &mut GridMap, unit: &Units) -> Result<Relaxed, GridErro
     };
     let mut now = widened(&mut place, &mut turning);
     let mut steps = 0;
+    let mut before = vec![now];
     while steps < MOST_STEPS {
         let of_face = |i: usize| energy.derivatives(energy.faces[i], &place);
         equations.sum(of_face, |v| is_free[v]);
@@ -74,7 +79,10 @@ pub(crate) fn relax(map: &mut GridMap, unit: &Units) -> Result<Relaxed, GridErro
         tracing::trace!(steps, energy = mean, length, "symmetric Dirichlet");
         (place, now) = (moved, there);
         turning.see(&energy.corners, &place);
-        if gain < LEAST_GAIN && length > SHORT {
+        before.push(now);
+        let is_slow =
+            steps >= SEVERAL && now > (1.0 - LEAST_GAIN_OF_SEVERAL) * before[steps - SEVERAL];
+        if is_slow || gain < LEAST_GAIN && length > SHORT {
             break;
         }
         if length < SHORT {

@@ -6,7 +6,9 @@
 use super::error::{BuildError, Unverified};
 use super::publication::{Publication, Published};
 use crate::config::Config;
+use crate::export::ExportError;
 use crate::export::atlas_json::FORMAT_VERSION;
+use crate::export::components::{Document, Entry};
 use crate::export::glb::whole::Whole;
 use crate::export::pictures::{self, Scene};
 use crate::export::report::whole::{self as page, Row};
@@ -28,7 +30,7 @@ pub(super) struct Assembly {
     extents: BTreeMap<usize, Extent>,
     /// … what a picture shows …
     scene: Scene,
-    /// … and what a page says.
+    /// … and what a page or a list says.
     rows: Vec<Row>,
 }
 
@@ -52,12 +54,10 @@ impl Assembly {
             result: result.map_err(|error| Failure::from(&error)),
         };
         if components > 1 {
-            let shown = shown.as_ref();
             self.rows.push(Row {
-                cells: shown.and_then(|s| s.cells),
-                psnr: shown.and_then(|s| s.psnr),
-                has_page: shown.is_some_and(|s| s.has_page),
+                has_page: shown.as_ref().is_some_and(|s| s.has_page),
                 outcome: outcome.clone(),
+                figures: shown.as_ref().map(|s| s.figures.clone()),
             });
         }
         if let Some(shown) = shown {
@@ -77,17 +77,28 @@ impl Assembly {
         config: &Config,
         notes: &[String],
     ) -> Result<(), BuildError> {
-        let (asset, given, id) = (publication.asset, publication.given, publication.id);
+        let (asset, id) = (publication.asset, publication.id);
+        let source = publication.source();
+        let has_folders = config.output.has_component_folders(self.rows.len());
         let Some(staging) = publication.finish().filter(|_| self.new) else {
             return Ok(());
         };
-        for subfolder in &self.missing {
+        for subfolder in self.missing.iter().filter(|_| has_folders) {
             staging.keep_previous(subfolder)?;
+        }
+        if !has_folders {
+            let entries = self.rows.iter();
+            let entries = entries.map(|row| Entry::new(&row.outcome, row.figures.clone()));
+            Document::new(source.clone(), entries.collect()).write(&staging)?;
         }
         if !self.whole.is_empty() {
             let appearance = &asset.soup.appearance;
             let bytes = self.whole.encode(id, FORMAT_VERSION, appearance)?;
             drop(self.whole);
+            if bytes.is_none() && !has_folders {
+                let (components, most) = (self.rows.len(), config.output.component_folders);
+                return Err(ExportError::TooFarApart { components, most }.into());
+            }
             if let Some(bytes) = bytes {
                 staging.write("surface.glb", &bytes)?;
                 drop(bytes);
@@ -102,7 +113,7 @@ impl Assembly {
             }
             if config.report.enabled {
                 let _part = part!("page");
-                page::write(&staging, id, given, config, &self.rows, notes)?;
+                page::write(&staging, id, &source.path, config, &self.rows, notes)?;
             }
         }
         Ok(staging.publish()?)

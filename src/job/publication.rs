@@ -8,6 +8,7 @@ use super::error::{BuildError, Unverified};
 use super::precision::Precision;
 use super::warnings::warnings;
 use crate::config::Config;
+use crate::export::components::{Figures, Source};
 use crate::export::folder::{Staging, component_name};
 use crate::export::{self, ExportError, Provenance, glb, pictures, report as report_page};
 use crate::observe::{Observer, part};
@@ -31,6 +32,8 @@ pub(super) struct Publication<'a> {
     observer: &'a dyn Observer,
     /// Made for the first atlas: where there is none, nothing is touched.
     staging: Mutex<Option<Arc<Staging>>>,
+    /// Where components are written and read back that get no folder.
+    scratch: Mutex<Option<Arc<Staging>>>,
 }
 
 /// What became of a component.
@@ -53,10 +56,7 @@ pub(super) struct Shown {
     pub padding: usize,
     pub extent: Extent,
     pub exhibit: Option<pictures::Exhibit>,
-    /// Cells of its grid.
-    pub cells: Option<usize>,
-    /// Decibels.
-    pub psnr: Option<f64>,
+    pub figures: Figures,
     /// Whether it has a page of its own.
     pub has_page: bool,
 }
@@ -81,6 +81,7 @@ impl<'a> Publication<'a> {
             notes,
             observer,
             staging: Mutex::default(),
+            scratch: Mutex::default(),
         }
     }
 
@@ -122,8 +123,10 @@ impl<'a> Publication<'a> {
             }
         };
         let notes = self.said_of(&atlas, index, components, config);
-        let folder = self.output.join(self.id);
-        let folder = folder.join(Self::subfolder(index, components));
+        let mut folder = self.output.join(self.id);
+        if config.output.has_component_folders(components) {
+            folder.push(Self::subfolder(index, components));
+        }
         Ok(published(Ok(Summary::of(&atlas, folder)), notes, shown))
     }
 
@@ -157,24 +160,24 @@ impl<'a> Publication<'a> {
             true => Err(ExportError::Interrupted),
             false => Ok(()),
         };
-        let staging = &*self.staging()?;
-        let subfolder = Self::subfolder(component, components);
-        let provenance = Provenance {
-            path: self.given,
-            blake3: &self.asset.blake3,
-            config_blake3: &self.config_blake3,
-            component,
-            components,
-            parts: &self.asset.soup.parts,
-            appearance: &self.asset.soup.appearance,
-            asset: self.id,
+        let has_folder = config.output.has_component_folders(components);
+        let mut staging = self.folder(&self.staging, Staging::begin)?;
+        if !has_folder {
+            staging = self.folder(&self.scratch, Staging::begin_scratch)?;
+        }
+        let staging = &*staging;
+        let withdraw = |subfolder: &str| match has_folder {
+            true => staging.withdraw(subfolder).map(drop),
+            false => staging.discard(subfolder),
         };
+        let subfolder = Self::subfolder(component, components);
+        let provenance = self.provenance(component, components);
         observer.stage("write", component, components);
         let mut surface = None;
         match export::write_component(staging, &subfolder, atlas, &provenance) {
             // The fault is in this component alone.
             Err(error @ ExportError::NotFinite { .. }) => {
-                staging.withdraw(&subfolder)?;
+                withdraw(&subfolder)?;
                 return Ok(Err(error.into()));
             }
             written => {
@@ -195,7 +198,7 @@ impl<'a> Publication<'a> {
             observer.stage("pages", component, components);
             found
         };
-        let is_one_of_few = components <= config.report.max_components;
+        let is_one_of_few = has_folder && components <= config.report.max_components;
         let has_page = config.report.enabled && is_one_of_few;
         let draw = || match config.pictures.enabled && is_one_of_few {
             true => {
@@ -220,7 +223,7 @@ impl<'a> Publication<'a> {
         let ((verdicts, extent), (drawn, described)) =
             rayon::join(check, || rayon::join(draw, describe));
         if let Some(unverified) = Unverified::of(&verdicts) {
-            staging.withdraw(&subfolder)?;
+            withdraw(&subfolder)?;
             let precision = Precision::of(&verdicts, atlas, &self.asset.soup);
             return Ok(Err(match precision {
                 Some(precision) => precision.into(),
@@ -230,26 +233,51 @@ impl<'a> Publication<'a> {
         drawn?;
         described?;
         go_on()?;
+        if !has_folder {
+            staging.discard(&subfolder)?;
+        }
         let shown = surface.zip(extent).map(|(surface, extent)| Shown {
             surface,
             padding: config.patches.padding,
             extent,
             exhibit: (config.pictures.enabled).then(|| pictures::Exhibit::of(atlas)),
-            cells: atlas.grid.as_ref().map(|grid| grid.cells()),
-            psnr: atlas.quality.image_psnr_db,
+            figures: Figures::of(atlas),
             has_page,
         });
         Ok(Ok(shown))
     }
 
-    /// The staging folder, made where there is none.
-    fn staging(&self) -> Result<Arc<Staging>, ExportError> {
-        let mut staging = self.staging.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(staging) = &*staging {
-            return Ok(Arc::clone(staging));
+    /// A folder, made where there is none.
+    fn folder(
+        &self,
+        slot: &Mutex<Option<Arc<Staging>>>,
+        begin: impl FnOnce(&Path, &str) -> Result<Staging, ExportError>,
+    ) -> Result<Arc<Staging>, ExportError> {
+        let mut folder = slot.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(folder) = &*folder {
+            return Ok(Arc::clone(folder));
         }
-        let begun = Arc::new(Staging::begin(self.output, self.id)?);
-        Ok(Arc::clone(staging.insert(begun)))
+        let begun = Arc::new(begin(self.output, self.id)?);
+        Ok(Arc::clone(folder.insert(begun)))
+    }
+
+    /// What the asset's files say of where it comes from.
+    pub fn source(&self) -> Source {
+        let provenance = self.provenance(0, 1);
+        Source::of(&provenance)
+    }
+
+    fn provenance(&self, component: usize, components: usize) -> Provenance<'_> {
+        Provenance {
+            path: self.given,
+            blake3: &self.asset.blake3,
+            config_blake3: &self.config_blake3,
+            component,
+            components,
+            parts: &self.asset.soup.parts,
+            appearance: &self.asset.soup.appearance,
+            asset: self.id,
+        }
     }
 
     /// The staging folder, where anything was written.

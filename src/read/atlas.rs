@@ -12,7 +12,11 @@ use super::exr::{self, Read};
 use super::npz::Npz;
 use crate::parallel;
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 use std::path::{Path, PathBuf};
+
+/// What an asset has whose components have no folders.
+const COMPONENTS: &str = "components.json";
 
 /// Version of the output format (`docs/format.md`) that is understood.
 const VERSIONS: std::ops::RangeInclusive<u64> = 1..=2;
@@ -31,6 +35,17 @@ pub enum FolderError {
     NoAtlas {
         /// As given.
         folder: PathBuf,
+    },
+    /// An asset of components without folders.
+    #[error(
+        "{} holds all {components} components in one surface.glb and no folder of each, which this needs; build with --set output.component_folders={components}",
+        folder.display()
+    )]
+    NoFolders {
+        /// As given.
+        folder: PathBuf,
+        /// How many there are.
+        components: usize,
     },
     /// A file that is missing or no file of its format.
     #[error("{}: {problem}; build the atlas again, or give its complete folder", path.display())]
@@ -213,10 +228,25 @@ pub fn source(folder: &Path) -> Option<Source> {
     struct Document {
         source: Source,
     }
-    let first = component_folders(folder).ok()?.into_iter().next()?;
-    let text = read_bounded(&first.join("atlas.json"), JSON_LIMIT).ok()?;
+    let document = match component_folders(folder) {
+        Ok(folders) => folders.first()?.join("atlas.json"),
+        Err(FolderError::NoFolders { .. }) => folder.join(COMPONENTS),
+        Err(_) => return None,
+    };
+    let text = read_bounded(&document, JSON_LIMIT).ok()?;
     let document: Document = serde_json::from_slice(&text).ok()?;
     Some(document.source)
+}
+
+/// How many components an asset has whose components have no folders.
+fn without_folders(folder: &Path) -> Option<usize> {
+    #[derive(Deserialize)]
+    struct Document {
+        components: Vec<IgnoredAny>,
+    }
+    let text = read_bounded(&folder.join(COMPONENTS), JSON_LIMIT).ok()?;
+    let document: Document = serde_json::from_slice(&text).ok()?;
+    Some(document.components.len())
 }
 
 /// The folders of the components of an asset, in order: the asset's own where it has one component.
@@ -234,11 +264,11 @@ pub fn component_folders(folder: &Path) -> Result<Vec<PathBuf>, FolderError> {
     };
     let mut folders: Vec<PathBuf> = entries.map(|e| e.path()).filter(is_component).collect();
     folders.sort();
-    match folders.is_empty() {
-        true => Err(FolderError::NoAtlas {
-            folder: folder.to_owned(),
-        }),
-        false => Ok(folders),
+    let folder = folder.to_owned();
+    match (folders.is_empty(), without_folders(&folder)) {
+        (false, _) => Ok(folders),
+        (true, Some(components)) => Err(FolderError::NoFolders { folder, components }),
+        (true, None) => Err(FolderError::NoAtlas { folder }),
     }
 }
 

@@ -28,6 +28,8 @@ pub(super) struct SoupBuilder {
     pub soup: Soup,
     pub budget: Budget,
     notes: Vec<String>,
+    /// Polygons that are no faces: how many, and where the first is.
+    short: Option<(usize, Place)>,
     max_vertices: u64,
     max_faces: u64,
 }
@@ -40,6 +42,7 @@ impl SoupBuilder {
             soup: Soup::default(),
             budget: Budget::new(params.max_file_bytes),
             notes: Vec::new(),
+            short: None,
             max_vertices: params.max_vertices.min(ids),
             max_faces: params.max_faces.min(ids),
         }
@@ -93,6 +96,11 @@ impl SoupBuilder {
         self.soup.faces.push(corners);
         self.soup.face_material.push(material);
         Ok(())
+    }
+
+    /// Leaves out a polygon of fewer than 3 corners: a line or a point, which some programs write among the faces.
+    pub fn short_polygon(&mut self, place: Place) {
+        self.short.get_or_insert((0, place)).0 += 1;
     }
 
     /// Remembers something that the soup does not hold.
@@ -192,6 +200,15 @@ impl SoupBuilder {
         if self.soup.faces.is_empty() {
             let vertices = self.soup.positions.len();
             return Err(ReadProblem::EmptyMesh { vertices });
+        }
+        match self.short {
+            Some((1, place)) => self.note(format!(
+                "1 face of fewer than 3 corners is skipped ({place})"
+            )),
+            Some((count, place)) => self.note(format!(
+                "{count} faces of fewer than 3 corners are skipped (the first: {place})"
+            )),
+            None => {}
         }
         self.close_part();
         let corners = 3 * self.soup.faces.len();

@@ -187,11 +187,9 @@ impl Obj {
             polygon.push(corner);
         }
         if polygon.len() < 3 {
-            return Err(ReadProblem::ShortPolygon {
-                face,
-                place,
-                corners: polygon.len(),
-            });
+            build.short_polygon(place);
+            self.polygon = polygon;
+            return Ok(());
         }
         let positions = &build.soup.positions;
         let triangles = triangulate(polygon.len(), |k| {

@@ -195,14 +195,11 @@ fn color(words: &[&[u8]], place: Place) -> Result<[f32; 4], ReadProblem> {
 fn read_face(words: &[&[u8]], place: Place, build: &mut SoupBuilder) -> Result<(), ReadProblem> {
     let face = build.soup.faces.len();
     let corners = integer(words[0], place, "the number of corners of a face")?;
-    let corners = usize::try_from(corners).unwrap_or(0);
-    if corners < 3 {
-        return Err(ReadProblem::ShortPolygon {
-            face,
-            place,
-            corners,
-        });
-    }
+    let corners = usize::try_from(corners).map_err(|_| ReadProblem::Expected {
+        place,
+        expected: "the number of corners of a face",
+        found: shorten(words[0]),
+    })?;
     let indices = words.get(1..).unwrap_or_default();
     if indices.len() < corners {
         return Err(ReadProblem::Expected {
@@ -210,6 +207,10 @@ fn read_face(words: &[&[u8]], place: Place, build: &mut SoupBuilder) -> Result<(
             expected: "as many vertex indices as the face has corners",
             found: shorten(&words.join(&b' ')),
         });
+    }
+    if corners < 3 {
+        build.short_polygon(place);
+        return Ok(());
     }
     let count = build.soup.positions.len();
     let index = |word: &[u8]| {

@@ -232,10 +232,11 @@ mod tests {
         assert_eq!(table["flow"], schema["properties"]["flow"]);
         assert_eq!(table["glob"]["type"], "string");
         assert!(table["run"]["properties"]["memory"].is_object());
+        assert!(table["output"]["properties"]["component_folders"].is_object());
         for pointer in [
             "/asset",
             "/input",
-            "/output",
+            "/output/properties/folder",
             "/run/properties/jobs",
             "/run/properties/total_memory",
         ] {

@@ -1,5 +1,5 @@
 //! JSON schemas (draft 2020-12) of what the program reads and writes: `atlas.json`, a line of `manifest.jsonl`, a
-//! line of a plan, `fit.json`, and `config.toml`.
+//! line of a plan, `components.json`, `fit.json`, and `config.toml`.
 //!
 //! *Enters:* nothing: those of the records follow from the types that are written, that of the configuration from
 //! [`KEYS`](crate::config::keys::KEYS) and the words of the commented `config.toml`. *Leaves:* a schema as JSON.
@@ -12,8 +12,8 @@ mod config;
 
 use crate::batch::plan::Line;
 use crate::export::atlas_json::Document;
-use crate::export::fit;
 use crate::export::manifest::Record;
+use crate::export::{components, fit};
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde_json::Value;
@@ -27,6 +27,12 @@ const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 #[must_use]
 pub fn atlas() -> Value {
     of::<Document>("atlas.json of affine-atlas")
+}
+
+/// The schema of `components.json`.
+#[must_use]
+pub fn components() -> Value {
+    of::<components::Document>("components.json of affine-atlas")
 }
 
 /// The schema of one line of `manifest.jsonl`.

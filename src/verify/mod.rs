@@ -26,6 +26,7 @@ mod glb;
 mod grid;
 mod images;
 mod lattice;
+mod listed;
 mod metric;
 mod packed;
 mod patches;
@@ -223,6 +224,9 @@ fn verify_asset(
     let mut verdicts = Verdicts::default();
     if folder.join("atlas.json").exists() {
         verdicts = verify_atlas(folder, options, source);
+    } else if components.is_empty() && folder.join(listed::FILE_NAME).exists() {
+        listed::check(folder, options, source.is_some(), &mut verdicts);
+        return Ok(verdicts);
     } else if components.is_empty() {
         return Err(VerifyError::NothingToVerify {
             path: folder.to_owned(),

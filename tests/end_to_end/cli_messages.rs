@@ -556,7 +556,7 @@ fn schema_and_explain_refuse_what_they_do_not_know() {
     let folder = folder();
     insta::assert_snapshot!(refusal(folder.path(), &["schema", "glb"], 2), @r"
     error: invalid value 'glb' for '<FILE>'
-      [possible values: atlas, manifest, config, plan, fit]
+      [possible values: atlas, components, manifest, config, plan, fit]
 
     For more information, try '--help'.
     ");

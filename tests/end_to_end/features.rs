@@ -245,3 +245,50 @@ fn axes_follow_the_circles_of_a_torus() {
     assert!(order > 0.95 * area, "{order} of {area}");
     assert!(off.abs() < 0.01, "{off} rad");
 }
+
+/// Corners of boxes are off by as little as a file has digits. A side without vertices inside is triangulated across its borders, and where they become edges again no face may have its corners on one line: no angle can be told from
+/// its lengths.
+#[test]
+fn sharp_edges_of_boxes_are_lines_however_little_their_corners_are_off() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (case, noise) in [0.0, 1e-6, 1e-5, 1e-4, 1e-3].into_iter().enumerate() {
+        for seed in 0..3_u64 {
+            let mut random = 7 * seed + 3;
+            let mut text = String::new();
+            for corner in 0..8 {
+                let sides = [7.2, 7.2, 71.0];
+                let at = [0, 1, 2].map(|k| {
+                    random = random
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1);
+                    let off = (random >> 33) as f64 / f64::from(1_u32 << 30) - 1.0;
+                    f64::from(corner >> k & 1) * sides[k] + noise * off
+                });
+                let [x, y, z] = at;
+                writeln!(text, "v {x:.7} {y:.7} {z:.7}").expect("a string");
+            }
+            // Open above.
+            for [a, b, c, d] in [
+                [0, 2, 3, 1],
+                [0, 1, 5, 4],
+                [1, 3, 7, 5],
+                [3, 2, 6, 7],
+                [2, 0, 4, 6],
+            ] {
+                let [a, b, c, d] = [a, b, c, d].map(|k| k + 1);
+                writeln!(text, "f {a} {b} {c} {d}").expect("a string");
+            }
+            let mesh = folder.path().join(format!("box-{case}-{seed}.obj"));
+            std::fs::write(&mesh, text).expect("written");
+            let built = build(&mesh, &["grid.cells=500", "report.enabled=false"]);
+            let document = document(&built.atlas());
+            let features = document["features"].as_array().expect("a list");
+            let lines = features.iter().filter(|f| f["is_line"] == true).count();
+            assert_eq!(
+                (features.len(), lines),
+                (8, 8),
+                "noise {noise}, seed {seed}"
+            );
+        }
+    }
+}

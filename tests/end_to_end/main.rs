@@ -11,6 +11,7 @@ mod features;
 mod fit;
 mod fixtures;
 mod flows;
+mod folders;
 mod fuzz_corpus;
 mod good;
 mod grids;

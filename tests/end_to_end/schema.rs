@@ -291,7 +291,10 @@ fn configurations_are_valid_and_broken_ones_are_not() {
                 "/asset",
                 Some(json!([{ "glob": "*.ply", "run": { "jobs": 2 } }])),
             ),
-            ("/asset", Some(json!([{ "glob": "*.ply", "output": {} }]))),
+            (
+                "/asset",
+                Some(json!([{ "glob": "*.ply", "output": { "folder": "x" } }])),
+            ),
         ],
     );
 }

@@ -13,18 +13,21 @@ mod syncing;
 mod unfinished;
 
 pub use crate::export::names::component_name;
-pub(crate) use crate::export::names::{RESERVED, is_asset_name};
+pub(crate) use crate::export::names::{COMPONENTS, RESERVED, is_asset_name};
 
 use crate::export::names::asset_name;
 use crate::export::{Action, ExportError};
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Component, Path, PathBuf};
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 use syncing::Syncing;
 use unfinished::{process_is_gone, remove_folder, replace, staging_name, sweep, unfinished_name};
+
+/// Bytes at the start of a `components.json` that say whose it is.
+const START: u64 = 256;
 
 /// Removes the staging folders of this process and refuses every further write, for the handler of
 /// Ctrl-C. A folder that is just being put in place is waited for: it is finished and stays.
@@ -105,7 +108,9 @@ impl Contents {
     fn has(self, name: &OsStr) -> bool {
         match self {
             Contents::Atlas => {
-                name == "atlas.json" || name.to_string_lossy().starts_with("component-")
+                name == "atlas.json"
+                    || name == COMPONENTS
+                    || name.to_string_lossy().starts_with("component-")
             }
             Contents::Cones => name == "cones.json",
             Contents::Fit => name == "fit.json",
@@ -121,7 +126,8 @@ pub struct Staging {
     output_root: PathBuf,
     target: PathBuf,
     path: PathBuf,
-    syncing: Syncing,
+    /// Absent where nothing is to stay.
+    syncing: Option<Syncing>,
 }
 
 impl Staging {
@@ -138,6 +144,13 @@ impl Staging {
         name: &str,
     ) -> Result<Staging, ExportError> {
         Self::begin_in(&REGISTRY, contents, output_root, name)
+    }
+
+    /// A folder for files that are read back and never put in place: they are not synced to disk.
+    pub fn begin_scratch(output_root: &Path, asset: &str) -> Result<Staging, ExportError> {
+        let mut staging = Self::begin(output_root, asset)?;
+        staging.syncing = None;
+        Ok(staging)
     }
 
     fn begin_in(
@@ -166,7 +179,7 @@ impl Staging {
             registry,
             output_root: output_root.to_owned(),
             target,
-            syncing: Syncing::new(&path),
+            syncing: Some(Syncing::new(&path)),
             path,
         })
     }
@@ -193,7 +206,7 @@ impl Staging {
         Ok(StagedFile {
             shown: self.target.join(relative),
             file: BufWriter::new(file),
-            syncing: &self.syncing,
+            syncing: self.syncing.as_ref(),
         })
     }
 
@@ -230,16 +243,23 @@ impl Staging {
             emptied.map_err(ExportError::io(Action::Write, &self.path))?;
             return Ok(false);
         }
-        let path = self.inside(subfolder)?;
-        if path.exists() {
-            fs::remove_dir_all(&path).map_err(ExportError::io(Action::Write, &path))?;
-        }
+        self.discard(subfolder)?;
         self.keep_previous(subfolder)
+    }
+
+    /// Takes back what was written into a subfolder.
+    pub fn discard(&self, subfolder: &str) -> Result<(), ExportError> {
+        let path = self.inside(subfolder)?;
+        match path.exists() {
+            true => fs::remove_dir_all(&path).map_err(ExportError::io(Action::Write, &path)),
+            false => Ok(()),
+        }
     }
 
     /// Puts the folder in place. On an error the older folder is where it was.
     pub fn publish(self) -> Result<(), ExportError> {
-        if !self.syncing.wait(&self.target)? {
+        let syncing = self.syncing.as_ref();
+        if !syncing.map_or(Ok(false), |syncing| syncing.wait(&self.target))? {
             sync_folders(&self.path).map_err(ExportError::io(Action::Publish, &self.target))?;
         }
         {
@@ -279,7 +299,7 @@ impl Drop for Staging {
 pub struct StagedFile<'a> {
     shown: PathBuf,
     file: BufWriter<File>,
-    syncing: &'a Syncing,
+    syncing: Option<&'a Syncing>,
 }
 
 impl StagedFile<'_> {
@@ -296,7 +316,7 @@ impl StagedFile<'_> {
             syncing,
         } = self;
         match file.into_inner() {
-            Ok(file) => syncing.sync(file, shown),
+            Ok(file) => syncing.map_or(Ok(()), |syncing| syncing.sync(file, shown)),
             Err(error) => Err(ExportError::io(Action::Write, &shown)(error.into_error())),
         }
     }
@@ -409,12 +429,23 @@ fn check_target(contents: Contents, target: &Path) -> Result<(), ExportError> {
     }
     let entries = fs::read_dir(target).and_then(|e| e.collect::<io::Result<Vec<_>>>());
     let names = entries.map_err(ExportError::io(Action::Read, target))?;
-    if names.is_empty() || names.iter().any(|e| contents.has(&e.file_name())) {
+    // Other programs have files of that name.
+    let is_ours =
+        |e: &fs::DirEntry| e.file_name() != COMPONENTS || is_list_of_components(&e.path());
+    let has = |e: &fs::DirEntry| contents.has(&e.file_name()) && is_ours(e);
+    if names.is_empty() || names.iter().any(has) {
         return Ok(());
     }
     Err(ExportError::ForeignFolder {
         path: target.into(),
     })
+}
+
+/// Whether a file is a `components.json` of this program.
+fn is_list_of_components(path: &Path) -> bool {
+    let mut start = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(START).read_to_end(&mut start));
+    read.is_ok() && String::from_utf8_lossy(&start).contains("\"format\": \"affine-atlas\"")
 }
 
 /// Waits until the disk has the entries of a folder and of all folders in it.

@@ -1,6 +1,8 @@
-//! The figures of an asset, from the `atlas.json` of its components.
+//! The figures of an asset, from the `atlas.json` of its components, or `components.json` where they have none.
 
+use crate::export::components;
 use crate::export::manifest::Record;
+use crate::export::names::COMPONENTS;
 use crate::read::bounded::{JSON_LIMIT, read_bounded};
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
@@ -62,36 +64,78 @@ struct Mean {
     mean: f64,
 }
 
-/// Those of the asset's atlases; nothing where there are none, or none can be read.
+impl Figures {
+    /// Those of one atlas.
+    fn of(document: &Document) -> Self {
+        let quality = &document.quality;
+        Self {
+            faces: document.topology.faces,
+            genus: document.topology.genus,
+            boundary_loops: document.topology.boundary_loops,
+            cones: document.cones.len() as u64,
+            patches: document.patches.len() as u64,
+            area_distortion: quality.area_distortion,
+            log_scale_std: quality.log_scale.std,
+            angle_error_mean: quality.angle_error.mean,
+            image_psnr_db: quality.image_psnr_db,
+        }
+    }
+
+    /// Those of a component that has no folder.
+    fn listed(figures: &components::Figures) -> Self {
+        Self {
+            faces: figures.faces as u64,
+            genus: figures.genus,
+            boundary_loops: figures.boundary_loops as u64,
+            cones: figures.cones as u64,
+            patches: figures.patches as u64,
+            area_distortion: figures.area_distortion,
+            log_scale_std: figures.log_scale_std,
+            angle_error_mean: figures.angle_error_mean,
+            image_psnr_db: figures.image_psnr_db,
+        }
+    }
+
+    fn with(self, other: &Self) -> Self {
+        Self {
+            faces: self.faces + other.faces,
+            genus: self.genus + other.genus,
+            boundary_loops: self.boundary_loops + other.boundary_loops,
+            cones: self.cones + other.cones,
+            patches: self.patches + other.patches,
+            area_distortion: self.area_distortion.max(other.area_distortion),
+            log_scale_std: self.log_scale_std.max(other.log_scale_std),
+            angle_error_mean: self.angle_error_mean.max(other.angle_error_mean),
+            image_psnr_db: match (self.image_psnr_db, other.image_psnr_db) {
+                (Some(a), Some(b)) => Some(a.min(b)),
+                (a, b) => a.or(b),
+            },
+        }
+    }
+}
+
+/// Those of the asset's atlases; nothing where there are none, or one cannot be read.
 pub(super) fn read(output_root: &Path, record: &Record) -> Option<Figures> {
-    let documents = record
-        .files
-        .iter()
-        .filter(|file| file.ends_with("/atlas.json") && !file.split('/').any(|part| part == ".."));
+    let inside = |file: &&String| !file.split('/').any(|part| part == "..");
     let mut all: Option<Figures> = None;
-    for file in documents {
+    let mut add = |figures: Figures| {
+        all = Some(match all.take() {
+            Some(all) => all.with(&figures),
+            None => figures,
+        });
+    };
+    for file in record.files.iter().filter(inside) {
+        let (folder, name) = file.rsplit_once('/')?;
         // A file that is gone or broken says nothing; `verify` is there to find it.
-        let bytes = read_bounded(&output_root.join(file), JSON_LIMIT).ok()?;
-        let document: Document = serde_json::from_slice(&bytes).ok()?;
-        let sum = all.get_or_insert_default();
-        let Quality {
-            area_distortion,
-            log_scale,
-            angle_error,
-            image_psnr_db,
-        } = document.quality;
-        sum.faces += document.topology.faces;
-        sum.genus += document.topology.genus;
-        sum.boundary_loops += document.topology.boundary_loops;
-        sum.cones += document.cones.len() as u64;
-        sum.patches += document.patches.len() as u64;
-        sum.area_distortion = sum.area_distortion.max(area_distortion);
-        sum.log_scale_std = sum.log_scale_std.max(log_scale.std);
-        sum.angle_error_mean = sum.angle_error_mean.max(angle_error.mean);
-        sum.image_psnr_db = match (sum.image_psnr_db, image_psnr_db) {
-            (Some(a), Some(b)) => Some(a.min(b)),
-            (a, b) => a.or(b),
-        };
+        let read = || read_bounded(&output_root.join(file), JSON_LIMIT).ok();
+        if name == "atlas.json" {
+            add(Figures::of(&serde_json::from_slice(&read()?).ok()?));
+        } else if name == COMPONENTS && folder == record.id {
+            let document: components::Document = serde_json::from_slice(&read()?).ok()?;
+            let listed = document.components.iter();
+            let listed = listed.filter_map(|entry| entry.figures.as_ref());
+            listed.map(Figures::listed).for_each(&mut add);
+        }
     }
     all
 }

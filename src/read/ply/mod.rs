@@ -225,11 +225,8 @@ fn read_faces(
         }
         let face = build.soup.faces.len();
         if indices.len() < 3 {
-            return Err(ReadProblem::ShortPolygon {
-                face,
-                place,
-                corners: indices.len(),
-            });
+            build.short_polygon(place);
+            continue;
         }
         let index = |k: usize| vertex_index(indices[k], vertices, face, place);
         let wedge = |k: usize| [texture[2 * k] as f32, (1.0 - texture[2 * k + 1]) as f32];
