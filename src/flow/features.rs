@@ -9,16 +9,16 @@ use crate::geometry::disjoint_sets::UnionFind;
 use crate::geometry::ids::{EdgeId, EdgeVec, HalfedgeId, NONE, VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, cross, dot, sub, triangle_area};
 use std::cmp::Ordering;
-use std::f64::consts::{FRAC_PI_2, LN_2, PI};
+use std::f64::consts::{LN_2, PI};
 use std::path::PathBuf;
 
 /// Fewest edges of a chain that counts where nobody named them: shorter ones are mostly noise, …
 pub const LEAST_EDGES: usize = 5;
-/// … unless they are as long as this, in square roots of the surface's area, and meet others at quarter turns: edges of a box.
-pub const LONG: f64 = 0.1;
-/// How far from a multiple of a quarter turn, radians, the surface may turn between such a chain and the next sharp edge.
-const OFF_QUARTER: f64 = 20.0 / 180.0 * PI;
-/// And its least length, in square roots of the surface's area: about a side of the cells when there are 2,000. What is shorter has no place in a grid, however
+/// … unless they are as long as this, in square roots of the surface's area, and have room on both sides: edges of a solid.
+pub const LONG: f64 = 0.05;
+/// The angle, radians, between such a chain and the next sharp edge at its ends that is room enough for cells.
+const SHARPEST: f64 = 29.0 / 180.0 * PI;
+/// Least length of a chain of many edges, in square roots of the surface's area: about a side of the cells when there are 2,000. What is shorter has no place in a grid, however
 /// many edges it has.
 pub const LEAST_LENGTH: f64 = 0.02;
 
@@ -80,20 +80,38 @@ impl Feature {
     }
 }
 
+/// Edges that shall be followed: named ones, sharp ones and those between materials; not on the border.
+fn wanted(mesh: &Mesh, params: &FeatureParams, named: &[EdgeId]) -> EdgeVec<bool> {
+    let c = &mesh.connectivity;
+    let least = params.angle.to_radians();
+    let by_angle = params.list.is_empty() && params.angle < 180.0;
+    let mut is_named = EdgeVec::filled(false, c.edge_count());
+    named.iter().for_each(|&e| is_named[e] = true);
+    let is_wanted = |e: EdgeId| {
+        let between = params.materials && is_between_materials(mesh, e);
+        let is_one = between || is_named[e] || (by_angle && bend(mesh, e) >= least);
+        is_one && !c.is_boundary_edge(e)
+    };
+    c.edges().map(is_wanted).collect()
+}
+
+/// Which part of the length of all sharp edges is in no feature; `None` without sharp edges.
+pub(crate) fn left_out(mesh: &Mesh, params: &FeatureParams) -> Option<f64> {
+    let sharp = wanted(mesh, params, &[]);
+    let edges = sharp.enumerate().filter(|(_, is_sharp)| **is_sharp);
+    let all: f64 = edges.map(|(e, _)| mesh.edge_length(e)).sum();
+    let kept: f64 = features(mesh, params, &[]).iter().map(|f| f.length).sum();
+    (all > 0.0).then(|| (1.0 - kept / all).max(0.0))
+}
+
 /// The features of a mesh, the most important first; see the module docs. `named` are the edges of the list that it has.
 pub fn features(mesh: &Mesh, params: &FeatureParams, named: &[EdgeId]) -> Vec<Feature> {
     let c = &mesh.connectivity;
     let bend: EdgeVec<f64> = c.edges().map(|e| bend(mesh, e)).collect();
     let least = params.angle.to_radians();
-    let by_angle = params.list.is_empty() && params.angle < 180.0;
+    let sharp = wanted(mesh, params, named);
     let mut is_named = EdgeVec::filled(false, c.edge_count());
     named.iter().for_each(|&e| is_named[e] = true);
-    let is_sharp = |e: EdgeId| {
-        let between = params.materials && is_between_materials(mesh, e);
-        let is_one = between || is_named[e] || (by_angle && bend[e] >= least);
-        is_one && !c.is_boundary_edge(e)
-    };
-    let sharp: EdgeVec<bool> = c.edges().map(is_sharp).collect();
     let area: f64 = c
         .faces()
         .map(|f| triangle_area(mesh.face_positions(f)))
@@ -105,7 +123,7 @@ pub fn features(mesh: &Mesh, params: &FeatureParams, named: &[EdgeId]) -> Vec<Fe
         let is_long = given_edges(mesh, f) >= LEAST_EDGES && length >= LEAST_LENGTH;
         // What is not sharp is between materials.
         is_long && (kinds.len() < f.edges.len() || chance(&kinds) <= CHANCE)
-            || length >= LONG && meets_at_quarter_turns(mesh, &sharp, f)
+            || length >= LONG && has_room(mesh, &sharp, f)
             || f.edges.iter().any(|&e| is_named[e])
     };
     let mut found: Vec<Feature> = chains(mesh, &sharp)
@@ -138,19 +156,14 @@ fn given_edges(mesh: &Mesh, f: &Feature) -> usize {
     f.vertices[1..].iter().filter(is_given).count()
 }
 
-/// Whether lines along a chain and along the sharp edges and borders that it meets at both ends would turn no face by much: between it and the next, the surface
-/// turns by about quarter turns.
-fn meets_at_quarter_turns(mesh: &Mesh, sharp: &EdgeVec<bool>, f: &Feature) -> bool {
+/// Whether there is room for cells on both sides of a chain at both ends: the next sharp edge or border is not nearer than [`SHARPEST`], and there is one.
+fn has_room(mesh: &Mesh, sharp: &EdgeVec<bool>, f: &Feature) -> bool {
     let c = &mesh.connectivity;
     let ends = [
         (f.vertices.first(), f.edges.first()),
         (f.vertices.last(), f.edges.last()),
     ];
     let is_line = |e: EdgeId| sharp[e] || c.is_boundary_edge(e);
-    let is_quarter = |turn: f64| {
-        let quarters = (turn / FRAC_PI_2).round().max(1.0);
-        (turn - quarters * FRAC_PI_2).abs() <= OFF_QUARTER
-    };
     ends.into_iter().all(|(v, e)| {
         let (Some(&v), Some(&e)) = (v, e) else {
             return false;
@@ -177,7 +190,10 @@ fn meets_at_quarter_turns(mesh: &Mesh, sharp: &EdgeVec<bool>, f: &Feature) -> bo
         let next = next.map_or(right.len(), |i| i + 1);
         let before = if left.is_empty() { right } else { left };
         let last = before.iter().rposition(is_line).unwrap_or(0);
-        is_quarter(sum(&right[..next])) && is_quarter(sum(&before[last..]))
+        [&right[..next], &before[last..]]
+            .map(sum)
+            .iter()
+            .all(|&angle| angle >= SHARPEST)
     })
 }
 
@@ -350,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn single_edges_count_where_lines_along_them_are_natural() {
+    fn single_edges_count_where_there_is_room_beside_them() {
         let sharp = |mesh: &Mesh| features(mesh, &FeatureParams::default(), &[]).len();
         // All edges of a box, whichever way its sides are divided.
         let cube = polycube([[0, 0, 0]], |_, _, _| true);
@@ -359,10 +375,20 @@ mod tests {
         let faces = cube.connectivity.to_faces();
         let open = surface(cube.positions.as_slice().to_vec(), faces[2..].to_vec());
         assert_eq!(sharp(&open), 8);
-        // Faces of a tetrahedron have corners of 45° and 60°.
-        let corners = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        // Corners of 45° and 60°, …
         let faces = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
-        assert_eq!(sharp(&surface(corners, faces)), 0);
+        let tetrahedron = |height| {
+            let corners = [
+                [0.0; 3],
+                [1.0, 0.0, 0.0],
+                [0.0, 1.0, 0.0],
+                [0.0, 0.0, height],
+            ];
+            surface(corners.to_vec(), faces.clone())
+        };
+        assert_eq!(sharp(&tetrahedron(1.0)), 6);
+        // … and of 18° and less, where three edges end: what is left are the three around the foot.
+        assert_eq!(sharp(&tetrahedron(3.0)), 3);
     }
 
     /// Sharp edges of noise go up and down; those that marching cubes leave at a rim do so now and then.

@@ -128,7 +128,7 @@ pub struct Material {
     pub alpha_mode: String,
     /// Alpha threshold of `MASK`.
     pub alpha_cutoff: f32,
-    /// True where both sides are drawn.
+    /// True where both sides are drawn, as by formats that do not speak of sides.
     pub double_sided: bool,
     /// Base colour texture.
     pub base_color_texture: Option<TextureUse>,
@@ -152,7 +152,7 @@ impl Default for Material {
             emissive: [0.0; 3],
             alpha_mode: "OPAQUE".into(),
             alpha_cutoff: 0.5,
-            double_sided: false,
+            double_sided: true,
             base_color_texture: None,
             metallic_roughness_texture: None,
             normal_texture: None,

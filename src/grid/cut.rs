@@ -11,7 +11,7 @@ use super::map::{Anchor, Corners, Freedom, GridMap};
 use super::quads::QuadMesh;
 use super::sheet::Aim;
 use super::slivers::thicken;
-use super::triangle::is_turned_over;
+use super::triangle::{THICK, THIN, is_turned_over};
 use super::{energy, relax};
 use crate::geometry::ids::{FaceId, HalfedgeId, NONE, VertexId};
 use std::collections::{BTreeSet, VecDeque};
@@ -302,11 +302,11 @@ fn settle(
         corners.put(map, &places);
     };
     round(map);
-    thicken(map);
+    thicken(map, THICK);
     relax_drawn(map, unit, unfolded)?;
     unfold(map, mesh, unit)?;
     round(map);
-    thicken(map);
+    thicken(map, THIN);
     round(map);
     let over: Vec<FaceId> = c
         .faces()

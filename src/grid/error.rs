@@ -8,7 +8,7 @@ use crate::geometry::ids::{EdgeId, FaceId, VertexId};
 pub enum GridError {
     /// The surface would have far more faces than the mesh.
     #[error(
-        "with straight borders and cones of quarter turns, edges of the flat surface cross those of the mesh so often that {vertices} vertices become {refined}, more than {most}: divide the long thin faces of the mesh"
+        "with straight borders and cones of quarter turns, edges of the flat surface cross those of the mesh so often that {vertices} vertices become {refined}, more than {most}: divide the long thin faces of the mesh into faces of similar sides"
     )]
     TooFine {
         /// Of the mesh.

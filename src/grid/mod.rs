@@ -266,7 +266,7 @@ fn of_cells(
         surface.lines,
         may_move,
     )?;
-    slivers::thicken(&mut map);
+    slivers::thicken(&mut map, triangle::THICK);
     let areas = c.faces().map(|f| triangle_area(mesh.face_positions(f)));
     let cell_size = (areas.sum::<f64>() / quads.quads.len() as f64).sqrt();
     let unit = Units::new(mesh, cell_size, params.density)?;

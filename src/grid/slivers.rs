@@ -1,10 +1,10 @@
 //! Faces that are too thin on the grid, or turned over, before the map is relaxed.
 //!
 //! *Enters:* a [`GridMap`] that is one to one but for a few thin faces, whose vertices rounding has put on the wrong side. *Leaves:* the same with these vertices moved, so that every face is as thick as
-//! [`THICK`] if it can be. The surface stays: only the map to the grid changes, by less than thin faces are long. *Not guaranteed:* that it succeeds.
+//! asked for if it can be. The surface stays: only the map to the grid changes, by less than thin faces are long. *Not guaranteed:* that it succeeds.
 
 use super::map::{Freedom, GridMap};
-use super::triangle::{THICK, is_turned_over, thickness};
+use super::triangle::{is_turned_over, thickness};
 use crate::geometry::ids::{FaceId, VertexId};
 use std::collections::BTreeSet;
 
@@ -23,9 +23,9 @@ const DIRECTIONS: [[f64; 2]; 8] = [
     [0.7, -0.7],
 ];
 
-/// Moves vertices of thin faces; see the module docs. The number of faces without area that are left.
-pub(crate) fn thicken(map: &mut GridMap) -> usize {
-    let is_thin = |map: &GridMap, f: FaceId| thickness(map.corners(f)) < THICK;
+/// Moves vertices of faces that are thinner than `thick`; see the module docs. The number of faces without area that are left.
+pub(crate) fn thicken(map: &mut GridMap, thick: f64) -> usize {
+    let is_thin = |map: &GridMap, f: FaceId| thickness(map.corners(f)) < thick;
     let c = &map.sheet.fine.connectivity;
     let mut thin: Vec<FaceId> = c.faces().filter(|&f| is_thin(map, f)).collect();
     for _ in 0..MOST_ROUNDS {
@@ -37,7 +37,7 @@ pub(crate) fn thicken(map: &mut GridMap) -> usize {
             if map.freedom[v] == Freedom::Fixed {
                 continue;
             }
-            if move_away(map, v) {
+            if move_away(map, v, thick) {
                 has_moved = true;
                 let c = &map.sheet.fine.connectivity;
                 touched.extend(c.outgoing(v).map(|h| c.face(h)));
@@ -54,7 +54,7 @@ pub(crate) fn thicken(map: &mut GridMap) -> usize {
 }
 
 /// Moves a vertex to where the thinnest of its faces is thicker. False where there is no such place.
-fn move_away(map: &mut GridMap, v: VertexId) -> bool {
+fn move_away(map: &mut GridMap, v: VertexId, thick: f64) -> bool {
     let c = &map.sheet.fine.connectivity;
     let first = map.sheet.at(c.vertex_halfedge(v));
     // The other two corners of every face around, in the frame of the first.
@@ -77,10 +77,11 @@ fn move_away(map: &mut GridMap, v: VertexId) -> bool {
         .map(|q| (q[0] - first[0]).hypot(q[1] - first[1]));
     let size = size.fold(0.0, f64::max);
     let (mut best, mut place) = (least(first), None);
-    if best >= THICK {
+    if best >= thick {
         return false;
     }
-    for k in 1..=HALVINGS {
+    // No farther than needed.
+    for k in (1..=HALVINGS).rev() {
         let radius = size * 0.5f64.powi(k);
         for [x, y] in DIRECTIONS {
             let p = match map.freedom[v] {
@@ -89,8 +90,7 @@ fn move_away(map: &mut GridMap, v: VertexId) -> bool {
                 Freedom::Free => [first[0] + radius * x, first[1] + radius * y],
                 _ => continue,
             };
-            // No farther than needed.
-            let there = least(p).min(2.0 * THICK);
+            let there = least(p).min(2.0 * thick);
             if there > best * 1.000001 + 1e-300 {
                 (best, place) = (there, Some(p));
             }

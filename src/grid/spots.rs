@@ -9,7 +9,7 @@ use super::quads::QuadMesh;
 use super::squares::Squares;
 use super::triangle::{self, double_area};
 use crate::geometry::ids::{FaceId, VertexVec};
-use crate::geometry::mesh::{cross, norm, sub};
+use crate::geometry::mesh::{cross, dot, norm, sub};
 use crate::parallel;
 
 /// Weight below which a corner of a face has no part in a point.
@@ -167,16 +167,27 @@ fn freedom(map: &GridMap, f: FaceId, weights: [f64; 3]) -> [bool; 2] {
     }
 }
 
-/// Normals of vertices, weighted by area.
+/// Normals of vertices: those of their faces, weighted by the angles there (Thürmer, Wüthrich 1998), so that at a corner of a box each side counts alike, however long it is.
 pub(super) fn normals(map: &GridMap) -> VertexVec<[f64; 3]> {
     let (c, position) = (&map.sheet.fine.connectivity, &map.sheet.fine.position);
     let mut normals = VertexVec::filled([0.0; 3], c.vertex_count());
     for f in c.faces() {
         let vertices = c.face_vertices(f);
-        let [p, q, r] = vertices.map(|v| position[v]);
-        let own = cross(sub(q, p), sub(r, p));
-        for v in vertices {
-            (0..3).for_each(|i| normals[v][i] += own[i]);
+        let at = vertices.map(|v| position[v]);
+        for (k, v) in vertices.into_iter().enumerate() {
+            let [e, g] = [1, 2].map(|i| sub(at[(k + i) % 3], at[k]));
+            let own = cross(e, g);
+            let double_area = norm(own);
+            if double_area > 0.0 {
+                let weight = double_area.atan2(dot(e, g)) / double_area;
+                (0..3).for_each(|i| normals[v][i] += weight * own[i]);
+            }
+        }
+    }
+    for normal in normals.as_mut_slice() {
+        let length = norm(*normal);
+        if length > 0.0 {
+            *normal = normal.map(|x| x / length);
         }
     }
     normals

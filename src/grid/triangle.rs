@@ -2,6 +2,8 @@
 
 /// Twice the area over the square of the longest side that faces are to have.
 pub(super) const THICK: f64 = 1e-5;
+/// Below this, rounding may have flattened one; other thin faces are as thin in space.
+pub(super) const THIN: f64 = 1e-9;
 
 /// Twice the area of a triangle.
 pub(crate) fn double_area([p, q, r]: [[f64; 2]; 3]) -> f64 {

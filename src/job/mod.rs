@@ -30,6 +30,7 @@ pub use precision::{Cause, Precision};
 
 use assembly::Assembly;
 use flatten::refine_for;
+use listing::MOST_LISTED;
 use publication::Publication;
 
 use crate::config::Config;
@@ -135,6 +136,7 @@ fn run_stages(
     let publication = Publication::new(&asset, given, output, &id, config, notes, observer);
     let mut assembly = Assembly::default();
     let mut parts = Vec::new();
+    let (mut told, mut untold) = (0, 0);
     components::each(
         &asset.soup,
         config,
@@ -143,7 +145,14 @@ fn run_stages(
         |published| {
             let published = published?;
             for note in &published.notes {
-                tracing::warn!(asset = id, "{note}");
+                // All of them stand on the page.
+                match config.report.enabled && told == MOST_LISTED {
+                    true => untold += 1,
+                    false => {
+                        told += 1;
+                        tracing::warn!(asset = id, "{note}");
+                    }
+                }
             }
             outcome.notes.extend_from_slice(&published.notes);
             parts.push(assembly.add(published));
@@ -151,6 +160,14 @@ fn run_stages(
         },
     )?;
     assembly.finish(publication, config, &outcome.notes)?;
+    if untold > 0 {
+        let page = output.join(&id).join("report.html");
+        tracing::warn!(
+            asset = id,
+            "{untold} more notes on components are in {}",
+            page.display()
+        );
+    }
     outcome.files = list_files(&output.join(&id)).unwrap_or_default();
     outcome.components = parts;
     Ok(())

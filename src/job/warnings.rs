@@ -6,6 +6,11 @@ use crate::product::AffineAtlas;
 /// Sides of cells that differ by a greater factor are told.
 const MOST_UNEVEN: f64 = 10.0;
 
+/// More cells than asked for are told where they are more than so many times as many …
+const TIMES_AS_MANY: usize = 2;
+/// … and so many were asked for: small parts of a file have the fewest that there are.
+const FEW_CELLS: usize = 200;
+
 /// What was asked for and could not be had, and much distortion, beginning with a verb.
 pub(super) fn warnings(atlas: &AffineAtlas, config: &Config) -> Vec<String> {
     let mut notes = Vec::new();
@@ -30,7 +35,18 @@ pub(super) fn warnings(atlas: &AffineAtlas, config: &Config) -> Vec<String> {
             grid.distortion.edge_ratio.p95,
         ];
         notes.push(format!(
-            "has cells of very different sizes: of 20 of their sides one is shorter than {p05:.2} and one longer than {p95:.2} times that of a mean cell; {flat}"
+            "has cells of very different sizes: 5 % of their sides are shorter than {p05:.2} of that of a mean cell, 5 % longer than {p95:.2} of it; more cells (grid.cells) give thin parts more room, and {flat}"
+        ));
+    }
+    if let Some(grid) = &atlas.grid
+        && config.grid.cells >= FEW_CELLS
+        && grid.cells() > TIMES_AS_MANY * config.grid.cells
+    {
+        notes.push(format!(
+            "has {} cells, where grid.cells asks for {}: its {} irregular points and its lines along sharp edges and borders leave no room for fewer",
+            grid.cells(),
+            config.grid.cells,
+            grid.irregular().len()
         ));
     }
     if let Some(met) = &atlas.metric.quarter_turns

@@ -21,6 +21,9 @@ use std::collections::{BTreeSet, HashMap};
 /// of such a face is rounding too.
 const COLLINEAR_EXCESS: f64 = 1e-12;
 
+/// Two points on a line are one where they are nearer than this part of its length: what float64 rounds in some steps, such as middles of edges.
+const SAME_POINT: f64 = 1e-12;
+
 /// A face on its way to the surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DraftFace {
@@ -32,13 +35,14 @@ pub struct DraftFace {
     pub within: Option<Box<[[f64; 3]; 3]>>,
 }
 
-/// The faces that stay, in the order of the file; parts of split faces at the end.
+/// The faces that stay, in the order of the file; parts of split faces at the end. And pairs of vertices that are one point of the line on which the corners of two faces at an edge lie: where there are any,
+/// they have to be joined first.
 pub fn clean(
     positions: &[[f64; 3]],
     given: &[[u32; 3]],
     stands_for: &[u32],
     changes: &mut Vec<Change>,
-) -> Vec<DraftFace> {
+) -> (Vec<DraftFace>, Vec<[u32; 2]>) {
     let mut faces = Vec::with_capacity(given.len());
     for (f, corners) in given.iter().enumerate() {
         let vertices = corners.map(|v| stands_for[v as usize]);
@@ -57,12 +61,13 @@ pub fn clean(
         }
     }
     drop_duplicates(&mut faces, changes);
+    let mut met = Vec::new();
     if faces.iter().any(|f| middle_corner(f, positions).is_some()) {
-        take_out_collinear(&mut faces, positions, changes);
+        met = take_out_collinear(&mut faces, positions, changes);
         faces.sort_by_key(|f| f.source);
         drop_duplicates(&mut faces, changes);
     }
-    faces
+    (faces, met)
 }
 
 /// Of faces with the same three vertices the first stays, whatever the orientation of the others, unless they are a
@@ -188,12 +193,14 @@ fn edge(a: u32, b: u32) -> (u32, u32) {
 }
 
 /// Takes out collinear faces as the module docs show, lowest first. A face that is split may become
-/// collinear itself and wait in turn; the number of rounds is bounded, and what is left then stays.
+/// collinear itself and wait in turn; the number of rounds is bounded, and what is left then stays. Pairs of vertices as [`clean`] says.
 fn take_out_collinear(
     faces: &mut Vec<DraftFace>,
     positions: &[[f64; 3]],
     changes: &mut Vec<Change>,
-) {
+) -> Vec<[u32; 2]> {
+    let mut met = Vec::new();
+    let between = |u: u32, v: u32| distance(positions[u as usize], positions[v as usize]);
     let mut slots: Vec<Option<DraftFace>> = faces.drain(..).map(Some).collect();
     let mut at_edge: HashMap<(u32, u32), BTreeSet<usize>> = HashMap::new();
     let mut waiting = BTreeSet::new();
@@ -224,8 +231,10 @@ fn take_out_collinear(
             let Some(other) = slots[j].clone() else {
                 continue;
             };
-            if other.vertices.contains(&b) {
+            let apex = other.vertices.into_iter().find(|v| ![a, c].contains(v));
+            if apex.is_some_and(|d| between(b, d) <= SAME_POINT * between(a, c)) {
                 // The same line seen from its other side: both vanish, and all three edges lose two faces.
+                met.extend(apex.filter(|&d| d != b).map(|d| [b.min(d), b.max(d)]));
                 remove(&mut slots, &mut at_edge, j, &other, changes);
                 continue;
             }
@@ -249,6 +258,7 @@ fn take_out_collinear(
         }
     }
     faces.extend(slots.into_iter().flatten());
+    met
 }
 
 fn enlist(at_edge: &mut HashMap<(u32, u32), BTreeSet<usize>>, i: usize, face: &DraftFace) {

@@ -11,7 +11,8 @@
 //!    something: both lie on an open edge, or an edge joins them (it has length zero, or next to none
 //!    beside the others of its faces, or beside these and the mesh). Two closed sheets that merely touch stay apart.
 //! 2. **clean** ([`clean`]): faces with a repeated vertex and duplicates go; faces without area whose
-//!    corners lie on one line, to within what float32 rounds, are taken out so that no T-junction stays.
+//!    corners lie on one line, to within what float32 rounds, are taken out so that no T-junction stays; where that shows that two vertices are one point of the line, both steps
+//!    are done again with these joined.
 //! 3. **glue** ([`glue`]): which sides of faces are joined. Two faces at an edge always are; where more
 //!    meet, those that enclose a solid wedge are joined and the rest stays open. Orientation flows
 //!    across edges with exactly two faces, and the minority is flipped.
@@ -276,9 +277,17 @@ pub fn repair(soup: &Soup, params: &RepairParams) -> Result<Repaired, RepairErro
     check_range(&frame)?;
     // Products of lengths in source units could overflow or vanish.
     let positions: Vec<_> = soup.positions.iter().map(|&p| frame.enter(p)).collect();
-    let mut changes = Vec::new();
-    let stands_for = weld::weld(&positions, &soup.faces, params, &mut changes);
-    let draft = clean::clean(&positions, &soup.faces, &stands_for, &mut changes);
+    let mut all_met = Vec::new();
+    let (mut changes, stands_for, draft) = loop {
+        let mut changes = Vec::new();
+        let stands_for = weld::weld(&positions, &soup.faces, params, &all_met, &mut changes);
+        let (draft, met) = clean::clean(&positions, &soup.faces, &stands_for, &mut changes);
+        // Each pair is a vertex fewer.
+        if met.is_empty() {
+            break (changes, stands_for, draft);
+        }
+        all_met.extend(met);
+    };
     if draft.is_empty() {
         return Err(RepairError::NoFaces {
             faces: soup.faces.len(),

@@ -23,12 +23,13 @@ const ROUNDED: f64 = 2e-6;
 /// … and than this part of the longest edge of each of its faces.
 const THIN: f64 = 1e-4;
 
-/// For every vertex the one that stands for it (itself, or a lower index at the same position). `faces` are those of the file;
+/// For every vertex the one that stands for it (itself, or a lower index at the same position). `faces` are those of the file, `met` pairs of vertices that are one point;
 /// adds a change for each that is gone and for each that no face uses.
 pub fn weld(
     positions: &[[f64; 3]],
     faces: &[[u32; 3]],
     params: &RepairParams,
+    met: &[[u32; 2]],
     changes: &mut Vec<Change>,
 ) -> Vec<u32> {
     let mut stands_for: Vec<u32> = (0..positions.len() as u32).collect();
@@ -50,6 +51,7 @@ pub fn weld(
             }
         }
     }
+    met.iter().for_each(|&[a, b]| join(&mut stands_for, a, b));
     join_needles(positions, faces, &mut stands_for);
     let mut used = vec![false; positions.len()];
     for &v in faces.iter().flatten() {

@@ -9,10 +9,18 @@ use super::surface::{Surface, UnionFind};
 use super::{Verdicts, VerifyOptions};
 use std::collections::BTreeSet;
 
-/// Every edge keeps its flat length to this share of its face's longest edge …
-pub(super) const LENGTH_TOLERANCE: f64 = 1e-9;
+/// Every edge keeps its flat length to this share of its face's longest edge, …
+const LENGTH_TOLERANCE: f64 = 1e-9;
+/// … or to so many times what the metric's curvature is off by: what is not flat cannot be laid out better, and paths around cones add up …
+const OF_CURVATURE: f64 = 100.0;
 /// … and this share of its chart's diameter: the floor of double precision.
 pub(super) const FLOOR: f64 = 1e-12;
+
+/// See above; 1e-7 at most, since curvature is off by 1e-9 at most.
+pub(super) fn length_tolerance(document: &Document) -> f64 {
+    let off = document.metric.max_curvature_error.clamp(0.0, 1e-9);
+    LENGTH_TOLERANCE.max(OF_CURVATURE * off)
+}
 
 /// The cut and the central chart, for later checks.
 pub(super) struct Slit {
@@ -67,7 +75,7 @@ pub(super) fn check(
     }
     verdicts.note(
         "central chart keeps flat lengths",
-        worst.0 < LENGTH_TOLERANCE,
+        worst.0 < length_tolerance(document),
         format!("{:.3e} of the face's longest edge", worst.0),
     );
     let flipped = uv.iter().filter(|t| !is_positive(**t, reach)).count();

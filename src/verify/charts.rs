@@ -2,7 +2,7 @@
 
 use super::Verdicts;
 use super::arrays::Arrays;
-use super::central::{FLOOR, LENGTH_TOLERANCE, Slit, length_error};
+use super::central::{FLOOR, Slit, length_error, length_tolerance};
 use super::document::Document;
 use super::formulas::{Extent2, Motion, Point2, Worst, distance2, is_positive};
 use super::metric::FLAT;
@@ -246,7 +246,7 @@ fn report(
     );
     verdicts.note(
         "charts keep flat lengths",
-        tally.length.0 < LENGTH_TOLERANCE,
+        tally.length.0 < length_tolerance(document),
         format!("{:.3e}", tally.length.0),
     );
     verdicts.note(

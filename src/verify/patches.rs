@@ -1,7 +1,7 @@
 //! Patches: connected, continuous, similar to the central chart, injective, of bounded scale.
 
 use super::arrays::{Arrays, NONE};
-use super::central::{FLOOR, LENGTH_TOLERANCE, Slit, at_corner};
+use super::central::{FLOOR, Slit, at_corner, length_tolerance};
 use super::document::{Document, Patch};
 use super::formulas::{Extent2, Point2, Turn, Worst, distance2, is_positive, lengths2, longest};
 use super::grid::Grid;
@@ -118,7 +118,7 @@ pub(super) fn check(
     }
     verdicts.note(
         "patches keep flat lengths at their scale",
-        shape.0 < LENGTH_TOLERANCE,
+        shape.0 < length_tolerance(document),
         format!("{:.3e} of the face's longest edge", shape.0),
     );
     verdicts.note(

@@ -29,6 +29,7 @@ mod rebuild;
 mod refusals;
 mod replacing;
 mod schema;
+mod shapes;
 mod survey;
 mod texture;
 mod units;

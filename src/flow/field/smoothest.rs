@@ -2,8 +2,8 @@
 //!
 //! *Enters:* transport between faces, areas. *Leaves:* one complex number a face whose fourth root is the cross.
 //!
-//! The energy Σ |u_g − e^{4iρ} u_f|² over the edges is that of Dirichlet on a triangulation without obtuse corners, at any density of the
-//! faces: both sides of an edge are about as long as the edge is apart. On a closed surface the constraint Σ A |u|² = 1 has the areas, so that the
+//! The energy is Σ w |u_g − e^{4iρ} u_f|² over the edges, where w is the length of an edge over the distance of the centroids beside it: Dirichlet's, at any density and any shape of the
+//! faces. With one weight for all, turns between the long thin faces around a pole of a sphere of rings and meridians cost nothing, and four cones lay in one place there. On a closed surface the constraint Σ A |u|² = 1 has the areas, so that the
 //! field does not follow the density either. A Hermitian matrix of n rows is a real symmetric one of 2n, and inverse
 //! iteration needs one factor.
 //!
@@ -18,7 +18,7 @@ use super::connection::transport;
 use super::{CrossField, FieldError};
 use crate::flow::solve::SymmetricSolver;
 use crate::geometry::connectivity::Connectivity;
-use crate::geometry::ids::{FaceId, FaceVec, HalfedgeVec};
+use crate::geometry::ids::{EdgeVec, FaceId, FaceVec, HalfedgeId, HalfedgeVec};
 use crate::observe::part;
 use std::f64::consts::FRAC_PI_2;
 
@@ -33,11 +33,13 @@ const MOST_STEPS: usize = 40;
 const PUSH: f64 = 0.3;
 /// The field that comes of that is taken where its energy is less than this part of the other's: cones in one place cost more than half of it. Fields that differ by less are as good as each other.
 const CLEARLY: f64 = 0.8;
+/// Largest weight of an edge, and the inverse of the least: thin faces would say what they do not know.
+const MOST_WEIGHT: f64 = 10.0;
 /// Steps of inverse iteration for the least eigenvalue, of which one digit is enough.
 const RATE_STEPS: usize = 3;
 
 /// The smoothest cross field of a surface, drawn to the border where it has one. `angle`: corner angles, radians; `area`: any unit. `pull`: what draws every face to a
-/// cross of angle θ from its first halfedge, weight times e^{4iθ}; beside it an edge has the weight 1. `lean`: by how much less a direction shall turn across a halfedge than the angles say (its twin's is the negative), and by how much the direction that a boundary halfedge draws to differs from its own, radians.
+/// cross of angle θ from its first halfedge, weight times e^{4iθ}; beside it an edge between equilateral triangles has the weight 1. `lean`: by how much less a direction shall turn across a halfedge than the angles say (its twin's is the negative), and by how much the direction that a boundary halfedge draws to differs from its own, radians.
 pub fn cross_field(
     connectivity: &Connectivity,
     angle: &FaceVec<[f64; 3]>,
@@ -51,7 +53,8 @@ pub fn cross_field(
     for h in c.halfedges() {
         rho[h] -= lean[h];
     }
-    let energy = Energy::new(c, &rho, area, pull);
+    let weight = weights(c, angle);
+    let energy = Energy::new(c, &rho, area, pull, &weight);
     let root = match energy.wanted > 0.0 {
         true => energy.diffused()?,
         false => energy.least_eigenvector()?,
@@ -77,6 +80,25 @@ pub fn cross_field(
     })
 }
 
+/// Weights of edges: how long an edge is beside the distance of its faces' centroids from each other, as between finite volumes; 1 between equilateral triangles, and at the border as if the face beyond were like that on this side.
+fn weights(c: &Connectivity, angle: &FaceVec<[f64; 3]>) -> EdgeVec<f64> {
+    // The height of a face over an edge, in lengths of the edge.
+    let height = |h: HalfedgeId| {
+        let (of, k) = (angle[c.face(h)], c.corner(h));
+        of[k].sin() * of[(k + 1) % 3].sin() / of[(k + 2) % 3].sin()
+    };
+    let weight = |e| {
+        let h = c.edge_halfedge(e);
+        let heights = height(h) + height(c.twin(h).unwrap_or(h));
+        let weight = 3.0_f64.sqrt() / heights;
+        match weight.is_nan() {
+            true => 1.0,
+            false => weight.clamp(1.0 / MOST_WEIGHT, MOST_WEIGHT),
+        }
+    };
+    c.edges().map(weight).collect()
+}
+
 /// ½ xᵀ A x − bᵀ x: half the energy but for a constant; two parts a face, real and imaginary.
 struct Energy {
     diagonal: Vec<f64>,
@@ -97,13 +119,15 @@ impl Energy {
         rho: &HalfedgeVec<f64>,
         area: &FaceVec<f64>,
         pull: &FaceVec<[f64; 2]>,
+        weight: &EdgeVec<f64>,
     ) -> Self {
         let faces = c.face_count();
         let parts = |f: FaceId| [2 * f.index() as u32, 2 * f.index() as u32 + 1];
         let mut diagonal = vec![SHIFT; 2 * faces];
         let mut load = vec![0.0; 2 * faces];
         let (mut pairs, mut values) = (Vec::new(), Vec::new());
-        let mut wanted = c.edges().filter(|&e| c.is_boundary_edge(e)).count() as f64;
+        let border = c.edges().filter(|&e| c.is_boundary_edge(e));
+        let mut wanted = border.map(|e| weight[e]).sum::<f64>();
         for f in c.faces() {
             let weight = pull[f][0].hypot(pull[f][1]);
             wanted += weight;
@@ -117,12 +141,14 @@ impl Energy {
         }
         for e in c.edges() {
             let h = c.edge_halfedge(e);
+            let w = weight[e];
             let [x, y] = parts(c.face(h));
             let (sine, cosine) = (4.0 * rho[h]).sin_cos();
+            let (sine, cosine) = (w * sine, w * cosine);
             let Some(t) = c.twin(h) else {
                 // The border's direction is −ρ in the frame of the face.
                 for (part, wanted) in [(x, cosine), (y, -sine)] {
-                    diagonal[part as usize] += 1.0;
+                    diagonal[part as usize] += w;
                     load[part as usize] += wanted;
                 }
                 continue;
@@ -131,12 +157,12 @@ impl Energy {
             if x == u {
                 // A face glued to itself: |u − e^{4iρ} u|².
                 for part in [x, y] {
-                    diagonal[part as usize] += 2.0 - 2.0 * cosine;
+                    diagonal[part as usize] += 2.0 * w - 2.0 * cosine;
                 }
                 continue;
             }
             for part in [x, y, u, v] {
-                diagonal[part as usize] += 1.0;
+                diagonal[part as usize] += w;
             }
             pairs.extend([[u, x], [u, y], [v, x], [v, y]]);
             values.extend([-cosine, sine, -sine, -cosine]);

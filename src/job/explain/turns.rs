@@ -27,6 +27,16 @@ pub(super) fn of(met: &QuarterTurns, mesh: &Mesh) -> StoredTurns {
     }
 }
 
+/// What is said of the part of sharp edges, by length, that is in no feature.
+pub(super) fn unfollowed(part: f64) -> Option<String> {
+    let percent = 100.0 * part;
+    (percent >= 0.5).then(|| {
+        format!(
+            "{percent:.0} % of the length of sharp edges (features.angle) is in no feature, since their chains are too short, lose themselves, or are as often ridge as valley: edges that shall be lines all the same can be named in features.file"
+        )
+    })
+}
+
 /// Sentences; vertices are named as in the input file.
 pub(super) fn describe(met: &StoredTurns) -> Vec<String> {
     let mut lines = Vec::new();

@@ -31,15 +31,56 @@ const GENUS_3: [Sample; 6] = [
     (680, -1.4850382593995),
 ];
 
+// Vertices of three and of five quarter turns; the others have four.
+const TORUS_CONES: [&[usize]; 2] = [&[0, 7, 14, 35, 42, 50], &[17, 24, 31, 53, 58, 59]];
+const GENUS_2_CONES: [&[usize]; 2] = [
+    &[0, 4, 44, 50, 79, 158, 163, 190, 192],
+    &[
+        18, 22, 33, 35, 65, 67, 74, 77, 97, 101, 109, 111, 135, 137, 144, 147, 152,
+    ],
+];
+const GENUS_3_CONES: [&[usize]; 2] = [
+    &[0, 4, 44, 50, 79, 218, 228, 233, 260, 262],
+    &[
+        18, 22, 33, 35, 65, 67, 74, 77, 85, 97, 101, 109, 111, 135, 137, 144, 147, 153, 167, 171,
+        179, 181, 205, 207, 214, 217,
+    ],
+];
+
 #[test]
 fn another_program_finds_the_same_lengths() {
     let cases = [
-        (shapes::torus(9, 7), TORUS, 142.287807030497, 5),
-        (shapes::plate(2, 2), GENUS_2, 907.501224680668, 5),
-        (shapes::plate(3, 2), GENUS_3, 1147.4385887202, 4),
+        (
+            shapes::torus(9, 7),
+            (TORUS_CONES, vec![3, 0]),
+            TORUS,
+            142.287807030497,
+            5,
+        ),
+        (
+            shapes::plate(2, 2),
+            (GENUS_2_CONES, vec![2, 0, -1, 1]),
+            GENUS_2,
+            907.501224680668,
+            5,
+        ),
+        (
+            shapes::plate(3, 2),
+            (GENUS_3_CONES, vec![2, 0, -1, 1, -2, 1]),
+            GENUS_3,
+            1147.4385887202,
+            4,
+        ),
     ];
-    for (shape, samples, squares, steps) in cases {
-        let prepared = prepare(&shape);
+    for (shape, (cones, turning), samples, squares, steps) in cases {
+        let mut prepared = prepare(&shape);
+        let mut cone = VertexVec::filled(4, prepared.c.vertex_count());
+        for (quarters, vertices) in [3, 5].into_iter().zip(cones) {
+            vertices
+                .iter()
+                .for_each(|&v| cone[VertexId::new(v)] = quarters);
+        }
+        prepared.signature = Signature { cone, turning };
         let norm = Norm::uniform(&prepared.c, 0.0);
         let (problem, params) = (prepared.problem(), SeamlessParams::default());
         let (start, reuse) = (prepared.start(), Reuse::AtTheEnd);
