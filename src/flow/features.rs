@@ -14,7 +14,7 @@ use std::path::PathBuf;
 
 /// Fewest edges of a chain that counts where nobody named them: shorter ones are mostly noise, …
 pub const LEAST_EDGES: usize = 5;
-/// … unless they are as long as this, in square roots of the surface's area, and have room on both sides: edges of a solid.
+/// … unless they are as long as this, in square roots of the surface's area, ridges or valleys throughout, and have room on both sides: edges of a solid.
 pub const LONG: f64 = 0.05;
 /// The angle, radians, between such a chain and the next sharp edge at its ends that is room enough for cells.
 const SHARPEST: f64 = 29.0 / 180.0 * PI;
@@ -95,17 +95,17 @@ fn wanted(mesh: &Mesh, params: &FeatureParams, named: &[EdgeId]) -> EdgeVec<bool
     c.edges().map(is_wanted).collect()
 }
 
-/// Which part of the length of all sharp edges is in no feature; `None` without sharp edges.
-pub(crate) fn left_out(mesh: &Mesh, params: &FeatureParams) -> Option<f64> {
-    let sharp = wanted(mesh, params, &[]);
-    let edges = sharp.enumerate().filter(|(_, is_sharp)| **is_sharp);
-    let all: f64 = edges.map(|(e, _)| mesh.edge_length(e)).sum();
-    let kept: f64 = features(mesh, params, &[]).iter().map(|f| f.length).sum();
-    (all > 0.0).then(|| (1.0 - kept / all).max(0.0))
+/// What there is to follow.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Features {
+    /// The most important first.
+    pub chains: Vec<Feature>,
+    /// Part of the length of all chains of sharp edges that is in no feature, of those that have a place in a grid ([`LEAST_LENGTH`]); 0 where there are none.
+    pub left_out: f64,
 }
 
-/// The features of a mesh, the most important first; see the module docs. `named` are the edges of the list that it has.
-pub fn features(mesh: &Mesh, params: &FeatureParams, named: &[EdgeId]) -> Vec<Feature> {
+/// The features of a mesh; see the module docs. `named` are the edges of the list that it has.
+pub fn features(mesh: &Mesh, params: &FeatureParams, named: &[EdgeId]) -> Features {
     let c = &mesh.connectivity;
     let bend: EdgeVec<f64> = c.edges().map(|e| bend(mesh, e)).collect();
     let least = params.angle.to_radians();
@@ -122,15 +122,20 @@ pub fn features(mesh: &Mesh, params: &FeatureParams, named: &[EdgeId]) -> Vec<Fe
         let kinds: Vec<bool> = kinds.map(|&e| is_ridge(mesh, e)).collect();
         let is_long = given_edges(mesh, f) >= LEAST_EDGES && length >= LEAST_LENGTH;
         // What is not sharp is between materials.
-        is_long && (kinds.len() < f.edges.len() || chance(&kinds) <= CHANCE)
-            || length >= LONG && has_room(mesh, &sharp, f)
+        let is_material = kinds.len() < f.edges.len();
+        let are_alike = kinds.iter().all(|&k| k == kinds[0]);
+        is_long && (is_material || chance(&kinds) <= CHANCE)
+            || length >= LONG && (is_material || are_alike) && has_room(mesh, &sharp, f)
             || f.edges.iter().any(|&e| is_named[e])
     };
-    let mut found: Vec<Feature> = chains(mesh, &sharp)
-        .into_iter()
-        .map(|chain| feature(mesh, &bend, chain))
-        .filter(counts)
-        .collect();
+    let all = chains(mesh, &sharp).into_iter();
+    let all = all.map(|chain| feature(mesh, &bend, chain));
+    let (mut found, others): (Vec<Feature>, Vec<Feature>) = all.partition(counts);
+    let total = |chains: &[Feature]| -> f64 {
+        let lengths = chains.iter().map(|f| f.length);
+        lengths.filter(|l| l / area.sqrt() >= LEAST_LENGTH).sum()
+    };
+    let (kept, lost) = (total(&found), total(&others));
     found.sort_by(|a, b| {
         let order = b.importance().partial_cmp(&a.importance());
         order.unwrap_or(Ordering::Equal)
@@ -147,7 +152,14 @@ pub fn features(mesh: &Mesh, params: &FeatureParams, named: &[EdgeId]) -> Vec<Fe
     };
     let (mut forest, cycles): (Vec<_>, Vec<_>) = found.into_iter().partition(joins);
     forest.extend(cycles);
-    forest
+    Features {
+        chains: forest,
+        left_out: if lost > 0.0 {
+            lost / (kept + lost)
+        } else {
+            0.0
+        },
+    }
 }
 
 /// Edges of a chain that the input has: not parts of them.
@@ -156,7 +168,7 @@ fn given_edges(mesh: &Mesh, f: &Feature) -> usize {
     f.vertices[1..].iter().filter(is_given).count()
 }
 
-/// Whether there is room for cells on both sides of a chain at both ends: the next sharp edge or border is not nearer than [`SHARPEST`], and there is one.
+/// Whether there is room for cells on both sides of a chain at both ends: the next sharp edge or border is not nearer than [`SHARPEST`], and there is one, unless the chain is closed.
 fn has_room(mesh: &Mesh, sharp: &EdgeVec<bool>, f: &Feature) -> bool {
     let c = &mesh.connectivity;
     let ends = [
@@ -164,6 +176,7 @@ fn has_room(mesh: &Mesh, sharp: &EdgeVec<bool>, f: &Feature) -> bool {
         (f.vertices.last(), f.edges.last()),
     ];
     let is_line = |e: EdgeId| sharp[e] || c.is_boundary_edge(e);
+    let is_closed = f.vertices.first() == f.vertices.last();
     ends.into_iter().all(|(v, e)| {
         let (Some(&v), Some(&e)) = (v, e) else {
             return false;
@@ -175,7 +188,7 @@ fn has_room(mesh: &Mesh, sharp: &EdgeVec<bool>, f: &Feature) -> bool {
         let sum = |part: &[HalfedgeId]| part.iter().map(|&h| corner_angle(mesh, h)).sum::<f64>();
         let is_line = |h: &HalfedgeId| is_line(c.edge(*h));
         let is_end = around.iter().filter(|h| is_line(h)).count() < 3;
-        if is_end && !c.is_boundary_vertex(v) {
+        if is_end && !is_closed && !c.is_boundary_vertex(v) {
             return false;
         }
         // Counterclockwise from this edge to the next line, and clockwise.
@@ -367,7 +380,7 @@ mod tests {
 
     #[test]
     fn single_edges_count_where_there_is_room_beside_them() {
-        let sharp = |mesh: &Mesh| features(mesh, &FeatureParams::default(), &[]).len();
+        let sharp = |mesh: &Mesh| features(mesh, &FeatureParams::default(), &[]).chains.len();
         // All edges of a box, whichever way its sides are divided.
         let cube = polycube([[0, 0, 0]], |_, _, _| true);
         assert_eq!(sharp(&cube), 12);
@@ -389,6 +402,34 @@ mod tests {
         assert_eq!(sharp(&tetrahedron(1.0)), 6);
         // … and of 18° and less, where three edges end: what is left are the three around the foot.
         assert_eq!(sharp(&tetrahedron(3.0)), 3);
+    }
+
+    #[test]
+    fn chains_of_few_edges_count_where_they_are_ridges_or_valleys_throughout() {
+        // Four edges in a row along the middle of a strip, each with a corner on both sides that lies as high as asked.
+        let strip = |heights: [f64; 4]| {
+            let middle = (0..5).map(|i| [f64::from(i) * 4.0, 0.0, 0.0]);
+            let side = |y: f64| (0..4).map(move |i| [2.0 + 4.0 * f64::from(i), y]);
+            let sides = [1.0, -1.0].map(|y| side(y).zip(heights).map(|([x, y], z)| [x, y, z]));
+            let positions = middle.chain(sides.into_iter().flatten()).collect();
+            let at = |i: u32| [[i, i + 1, i + 5], [i + 1, i, i + 9]];
+            let between = |i: u32| [[i + 1, i + 6, i + 5], [i + 1, i + 9, i + 10]];
+            let faces = (0..4).flat_map(at).chain((0..3).flat_map(between));
+            surface(positions, faces.collect())
+        };
+        let all = |heights| features(&strip(heights), &FeatureParams::default(), &[]);
+        let found = |heights| {
+            let found = all(heights);
+            assert_eq!(
+                found.left_out,
+                if found.chains.is_empty() { 1.0 } else { 0.0 }
+            );
+            found.chains.len()
+        };
+        assert_eq!(found([0.5; 4]), 1);
+        assert_eq!(found([-0.5; 4]), 1);
+        assert_eq!(found([0.5, -0.5, 0.5, -0.5]), 0);
+        assert_eq!(found([0.5, 0.5, 0.5, -0.5]), 0);
     }
 
     /// Sharp edges of noise go up and down; those that marching cubes leave at a rim do so now and then.
@@ -436,7 +477,7 @@ mod tests {
             ..FeatureParams::default()
         };
         for n in [2, 4, 8] {
-            let found = features(&marked(n), &params, &[]);
+            let found = features(&marked(n), &params, &[]).chains;
             assert_eq!(found.len(), 1, "{n}");
             assert_eq!(found[0].edges.len(), 4 * n as usize);
             assert!((found[0].length - 2.0).abs() < 1e-12);

@@ -14,6 +14,7 @@
 
 mod connection;
 mod diffused;
+mod narrow;
 mod quarters;
 mod ragged;
 mod smoothest;
@@ -22,6 +23,7 @@ mod tests;
 mod ways;
 
 pub use diffused::diffused;
+pub use narrow::open_narrow;
 pub use quarters::{GridCones, Moved};
 pub use ragged::leans;
 pub use smoothest::cross_field;

@@ -59,6 +59,8 @@ pub struct FromField {
     pub features: Vec<Feature>,
     /// Features that leave no room for the corners of a field.
     pub crowded: Vec<Feature>,
+    /// Part of the length of sharp edges that is in no feature, see [`Features`](crate::flow::features::Features).
+    pub left_out: f64,
     /// Both sides of the edges of every feature, as halfedges of the own part of the [`LoopedSurface`](crate::flow::looped::LoopedSurface) that is cut open along all of them.
     pub sides: Vec<Vec<[HalfedgeId; 2]>>,
     /// The field on that part.

@@ -15,6 +15,21 @@ pub struct Distortion {
     pub angle: MeanMax,
     /// Lengths of the quad mesh's edges over the size of a cell.
     pub edge_ratio: Quantiles,
+    /// Of cells with straight edges in space.
+    pub scaled_jacobian: ScaledJacobian,
+}
+
+/// The least sine of a cell's corners, seen along the mean normal of the corners (Knupp 2003): 1 for rectangles, negative where a corner is turned over.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ScaledJacobian {
+    /// Of the worst cell.
+    pub min: f64,
+    /// Of a twentieth of the cells it is less.
+    pub p05: f64,
+    /// Mean.
+    pub mean: f64,
+    /// Number of cells where it is not positive.
+    pub not_positive: usize,
 }
 
 /// Mean and maximum.
@@ -46,6 +61,7 @@ pub(super) fn measure(
         symmetric_dirichlet: dirichlet(map, cell_size),
         angle: angles(mesh, points),
         edge_ratio: edges(mesh, points, cell_size),
+        scaled_jacobian: jacobians(mesh, points),
     }
 }
 
@@ -100,6 +116,38 @@ fn angles(mesh: &QuadMesh, points: &[[f64; 3]]) -> MeanMax {
     }
 }
 
+fn jacobians(mesh: &QuadMesh, points: &[[f64; 3]]) -> ScaledJacobian {
+    let of_cell = |corners: &[u32; 4]| {
+        let p = corners.map(|i| points[i as usize]);
+        scaled_jacobian(p)
+    };
+    let mut all: Vec<f64> = mesh.quads.iter().map(of_cell).collect();
+    let count = all.len().max(1);
+    let mean = all.iter().sum::<f64>() / count as f64;
+    all.sort_unstable_by(f64::total_cmp);
+    let at = |part: f64| all.get(((count - 1) as f64 * part).round() as usize);
+    ScaledJacobian {
+        min: at(0.0).copied().unwrap_or(0.0),
+        p05: at(0.05).copied().unwrap_or(0.0),
+        mean,
+        not_positive: all.iter().filter(|x| **x <= 0.0).count(),
+    }
+}
+
+/// Of a cell; 0 where it has no normal or a corner no angle.
+fn scaled_jacobian(p: [[f64; 3]; 4]) -> f64 {
+    let edges = |k: usize| [sub(p[(k + 1) % 4], p[k]), sub(p[(k + 3) % 4], p[k])];
+    let corner = [0, 1, 2, 3].map(|k| cross(edges(k)[0], edges(k)[1]));
+    let normal: [f64; 3] = std::array::from_fn(|i| corner.iter().map(|n| n[i]).sum());
+    let sine = |k: usize| {
+        let [a, b] = edges(k);
+        let along: f64 = (0..3).map(|i| corner[k][i] * normal[i]).sum();
+        let sine = along / (norm(normal) * norm(a) * norm(b));
+        if sine.is_finite() { sine } else { 0.0 }
+    };
+    (0..4).map(sine).fold(1.0, f64::min)
+}
+
 fn edges(mesh: &QuadMesh, points: &[[f64; 3]], cell_size: f64) -> Quantiles {
     let mut lengths = Vec::new();
     for (q, (corners, across)) in mesh.quads.iter().zip(&mesh.across).enumerate() {
@@ -116,5 +164,33 @@ fn edges(mesh: &QuadMesh, points: &[[f64; 3]], cell_size: f64) -> Quantiles {
     Quantiles {
         p05: at(0.05),
         p95: at(0.95),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_scaled_jacobian_is_the_least_sine_of_a_corner() {
+        let plane = |p: [[f64; 2]; 4]| scaled_jacobian(p.map(|[x, y]| [x, 2.0 * y, 3.0 * y]));
+        // On a plane that is no axis's: sides along x and across are perpendicular there.
+        assert!((plane([[0.0, 0.0], [5.0, 0.0], [5.0, 1.0], [0.0, 1.0]]) - 1.0).abs() < 1e-15);
+        let flat = |p: [[f64; 2]; 4]| scaled_jacobian(p.map(|[x, y]| [x, y, 0.0]));
+        let leaning = flat([[0.0, 0.0], [1.0, 0.0], [2.0, 1.0], [1.0, 1.0]]);
+        assert!((leaning - 0.5f64.sqrt()).abs() < 1e-15);
+        // A dart: the corner that points inwards is turned over by as much.
+        let dart = flat([[0.0, 0.0], [2.0, -2.0], [1.0, 0.0], [2.0, 2.0]]);
+        let inwards = -(2.0 * 1.0 * 2.0) / 5.0;
+        assert!((dart - inwards).abs() < 1e-15, "{dart} {inwards}");
+        // A right angle, bent along a diagonal: all corners keep their sines but for the lean of their normals.
+        let bent = scaled_jacobian([
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [1.0, 1.0, 0.5],
+            [0.0, 1.0, 0.0],
+        ]);
+        assert!(bent > 0.8 && bent < 1.0);
+        assert_eq!(flat([[0.0, 0.0]; 4]), 0.0);
     }
 }

@@ -51,7 +51,9 @@ pub(crate) fn spacings(cells: usize) -> Vec<Spacing> {
 }
 
 /// Where an edge may be split, one after another. Not in halves, where texels of a cell lie, too: these would be on edges of faces, which say little of them.
-const PARTS: [f64; 4] = [0.47, 0.53, 0.38, 0.62];
+const PARTS: [f64; 16] = [
+    0.47, 0.53, 0.38, 0.62, 0.44, 0.56, 0.41, 0.59, 0.35, 0.65, 0.32, 0.68, 0.29, 0.71, 0.26, 0.74,
+];
 
 /// The least distance between new vertices, by faces; edges of more than twice that are long.
 fn apart(mesh: &Mesh, spacing: Spacing) -> FaceVec<f64> {
@@ -250,6 +252,21 @@ mod tests {
         // Once is enough, nearly.
         let again = refined(fine.clone(), SPACING).positions.len();
         assert!(again < fine.positions.len() + 10);
+    }
+
+    #[test]
+    fn bars_thinner_than_the_spacing_get_vertices_all_along() {
+        let mut bar = polycube([[0, 0, 0]], |_, _, _| true);
+        bar.positions
+            .as_mut_slice()
+            .iter_mut()
+            .for_each(|p| p[0] *= 200.0);
+        let wide = (SPACING.elsewhere * area(&bar)).sqrt();
+        assert!(wide > 1.2);
+        let (fine, _) = checked(&bar);
+        let c = &fine.connectivity;
+        let longest = c.edges().map(|e| fine.edge_length(e)).fold(0.0, f64::max);
+        assert!(longest < 20.0 * wide, "{longest} of {wide}");
     }
 
     #[test]

@@ -11,6 +11,9 @@ const TIMES_AS_MANY: usize = 2;
 /// … and so many were asked for: small parts of a file have the fewest that there are.
 const FEW_CELLS: usize = 200;
 
+/// A greater part of sharp edges that are no lines is told.
+const MOST_LEFT_OUT: f64 = 0.1;
+
 /// What was asked for and could not be had, and much distortion, beginning with a verb.
 pub(super) fn warnings(atlas: &AffineAtlas, config: &Config) -> Vec<String> {
     let mut notes = Vec::new();
@@ -54,8 +57,27 @@ pub(super) fn warnings(atlas: &AffineAtlas, config: &Config) -> Vec<String> {
     {
         let all = met.lines.len() + met.given_up.len();
         notes.push(format!(
-            "has {} of {all} features as lines: the others cannot be lines with these, or only in faces without width; atlas.json names them, and a larger features.angle asks for fewer",
+            "has {} of {all} features as lines: no metric was found with the others, too; `affine-atlas explain` says where they are, and features.file can name the edges that matter",
             met.lines.len()
+        ));
+    }
+    if let Some(met) = &atlas.metric.quarter_turns
+        && met.left_out > MOST_LEFT_OUT
+    {
+        notes.push(format!(
+            "has {:.0} % of the length of its sharp edges in no feature: their chains are short or narrow, or as often ridge as valley; those that shall be lines all the same can be named in features.file",
+            100.0 * met.left_out
+        ));
+    }
+    if let Some(grid) = &atlas.grid
+        && grid.distortion.scaled_jacobian.not_positive > 0
+    {
+        let cells = grid.distortion.scaled_jacobian;
+        notes.push(format!(
+            "has {} of {} cells that are turned over at a corner or flat there, drawn with straight edges (least scaled Jacobian {:.2}): where sharp edges meet at small angles, or the surface bends within a cell; for the latter, more cells (grid.cells)",
+            cells.not_positive,
+            grid.cells(),
+            cells.min
         ));
     }
     if let Some(reason) = &atlas.no_grid {

@@ -36,8 +36,28 @@ pub struct StoredTurns {
     pub merged: usize,
     /// Number of features that are lines.
     pub lines: usize,
-    /// The others: number of edges, and both ends as vertices of the input file; absent for one that repair made.
-    pub given_up: Vec<(usize, [Option<u32>; 2])>,
+    /// The others.
+    pub given_up: Vec<NoLine>,
+    /// Part of the length of sharp edges that is in neither.
+    pub left_out: f64,
+}
+
+/// A feature that is no line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NoLine {
+    /// Number of edges.
+    pub edges: usize,
+    /// Both ends.
+    pub ends: [FeatureEnd; 2],
+}
+
+/// Where a feature ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FeatureEnd {
+    /// Vertex of the input file; absent for one that repair made.
+    pub vertex: Option<u32>,
+    /// Source units.
+    pub position: [f64; 3],
 }
 
 /// A surface with its flat lengths.
@@ -83,6 +103,8 @@ struct Holonomy {
     adjusted: usize,
     #[serde(default)]
     merged: usize,
+    #[serde(default)]
+    left_out: f64,
 }
 
 #[derive(Deserialize)]
@@ -110,17 +132,34 @@ struct Feature {
 
 impl Document {
     /// `source_vertex`: the vertex of the input file of every row of `positions`.
-    fn turns(&self, holonomy: &Holonomy, source_vertex: &[u32]) -> StoredTurns {
+    fn turns(
+        &self,
+        holonomy: &Holonomy,
+        source_vertex: &[u32],
+        positions: &[[f64; 3]],
+    ) -> Result<StoredTurns, String> {
         let error = self.quality.conformal_error.as_ref();
-        let name = |v: Option<&usize>| {
-            let named = v.and_then(|&v| source_vertex.get(v));
-            named.copied().filter(|&v| v != NONE)
+        let end = |v: Option<&usize>| -> Result<FeatureEnd, String> {
+            let rows = positions.len();
+            let row = v.copied().filter(|&v| v < rows && v < source_vertex.len());
+            let row = row.ok_or_else(|| {
+                format!("atlas.json has a feature that ends in no vertex, but there are {rows}")
+            })?;
+            Ok(FeatureEnd {
+                vertex: Some(source_vertex[row]).filter(|&v| v != NONE),
+                position: positions[row],
+            })
         };
         let given_up = self.features.iter().filter(|f| !f.is_line).map(|f| {
-            let ends = [name(f.vertices.first()), name(f.vertices.last())];
-            (f.vertices.len().saturating_sub(1), ends)
+            let ends = [end(f.vertices.first())?, end(f.vertices.last())?];
+            Ok(NoLine {
+                edges: f.vertices.len().saturating_sub(1),
+                ends,
+            })
         });
-        StoredTurns {
+        let given_up = given_up.collect::<Result<_, String>>()?;
+        Ok(StoredTurns {
+            left_out: holonomy.left_out,
             loops: (holonomy.loops.iter())
                 .map(|l| (l.turns, l.residual))
                 .collect(),
@@ -128,8 +167,8 @@ impl Document {
             adjusted: holonomy.adjusted,
             merged: holonomy.merged,
             lines: self.features.iter().filter(|f| f.is_line).count(),
-            given_up: given_up.collect(),
-        }
+            given_up,
+        })
     }
 }
 
@@ -156,7 +195,8 @@ fn arrays(path: &Path, document: Document) -> Result<StoredMetric, String> {
     let turns = match &document.metric.holonomy {
         Some(holonomy) => {
             let (source_vertex, _) = npz.read::<u32>("source_vertex", &[Some(vertices)])?;
-            Some(document.turns(holonomy, &source_vertex))
+            let rows = positions.as_chunks::<3>().0;
+            Some(document.turns(holonomy, &source_vertex, rows)?)
         }
         None => None,
     };

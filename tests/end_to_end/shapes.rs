@@ -65,6 +65,84 @@ fn all_edges_of_prisms_are_lines() {
     }
 }
 
+/// To a cross field the sides of a narrow corner are parallel, and its cone would lie next to the corner.
+#[test]
+fn narrow_corners_leave_room_for_cells_however_they_are_turned() {
+    // With fewer cells a mesh gets fewer vertices, and the narrower corner too few for its cone.
+    for (degrees, cells) in [(30.0_f64, 2000), (38.0, 500), (45.0, 500)] {
+        for turned in [0.0, 0.7] {
+            let (sine, cosine) = f64::sin_cos(turned);
+            let triangle = [
+                [0.0, 0.0],
+                [3.0, 0.0],
+                [0.0, 3.0 * degrees.to_radians().tan()],
+            ];
+            let triangle = triangle.map(|[x, y]| [cosine * x - sine * y, sine * x + cosine * y]);
+            let (points, faces) = prism(&triangle, 2.0);
+            let document = built(&points, &faces, cells);
+            assert_eq!(lines(&document), [9; 2], "{degrees} {turned}");
+            let least = document["grid"]["distortion"]["scaled_jacobian"]["min"].as_f64();
+            assert!(least > Some(0.1), "{degrees} {turned}: {least:?}");
+        }
+    }
+}
+
+/// The edges of the small triangles at the corners are not sharp, so each side has four sharp edges around it that meet no others.
+#[test]
+fn closed_chains_of_few_edges_are_lines() {
+    let (half, chamfer) = ([2.0, 1.5, 1.0], 0.3);
+    // Three at each corner of the box, each on one of its sides.
+    let mut points: Vec<[f64; 3]> = Vec::new();
+    for corner in 0..8 {
+        let sign = |k: usize| if corner >> k & 1 == 1 { 1.0 } else { -1.0 };
+        for side in 0..3 {
+            let at = |k: usize| sign(k) * (half[k] - if k == side { 0.0 } else { chamfer });
+            points.push([0, 1, 2].map(at));
+        }
+    }
+    let number = |corner: usize, side: usize| 3 * corner + side;
+    let mut faces: Vec<Vec<usize>> = Vec::new();
+    for corner in 0..8 {
+        faces.push((0..3).map(|side| number(corner, side)).collect());
+        for axis in (0..3).filter(|axis| corner >> axis & 1 == 0) {
+            // The chamfer along an edge of the box, and the side that begins at its corner.
+            let (next, [a, b]) = (corner | 1 << axis, [(axis + 1) % 3, (axis + 2) % 3]);
+            faces.push(vec![
+                number(corner, a),
+                number(corner, b),
+                number(next, b),
+                number(next, a),
+            ]);
+        }
+    }
+    for (side, end) in (0..3).flat_map(|side| [(side, 0), (side, 1)]) {
+        let [a, b] = [(side + 1) % 3, (side + 2) % 3];
+        let around = [[0, 0], [1, 0], [1, 1], [0, 1]];
+        faces.push(
+            around
+                .map(|[x, y]| number(end << side | x << a | y << b, side))
+                .to_vec(),
+        );
+    }
+    // Counterclockwise from outside.
+    for face in &mut faces {
+        let [p, q, r] = [0, 1, 2].map(|k| points[face[k]]);
+        let edge = |to: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| to[i] - p[i]) };
+        let (a, b) = (edge(q), edge(r));
+        let normal = [
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+        ];
+        if (0..3).map(|i| normal[i] * p[i]).sum::<f64>() < 0.0 {
+            face.reverse();
+        }
+    }
+    let document = built(&points, &faces, 500);
+    assert_eq!(lines(&document), [6, 6]);
+    assert_eq!(document["metric"]["holonomy"]["left_out"], 0.0);
+}
+
 /// Faces around a pole are long and thin, and a field that turns once around it in them is not smooth.
 #[test]
 fn spheres_of_rings_and_meridians_have_no_cones_in_one_place() {
@@ -117,6 +195,11 @@ fn frames_of_thin_bars_stay_as_they_are_relaxed() {
         faces.push(vec![k, next, 8 + next, 8 + k]);
         faces.push(vec![4 + k, 12 + k, 12 + next, 4 + next]);
     }
+    // The edges of thin bars have vertices all along: 424 where those across a bar were in the way.
+    let fine = built(&points, &faces, 2000);
+    assert_eq!(lines(&fine), [16, 16]);
+    let mean = fine["grid"]["distortion"]["symmetric_dirichlet"]["mean"].as_f64();
+    assert!(mean < Some(4.1), "{mean:?}");
     let document = built(&points, &faces, 104);
     assert_eq!(lines(&document), [16, 16]);
     let mean = document["grid"]["distortion"]["symmetric_dirichlet"]["mean"].as_f64();

@@ -191,6 +191,9 @@ pub struct Holonomy {
     pub adjusted: usize,
     /// Number of quarter turns that were moved between cones of the field, of which one is gone.
     pub merged: usize,
+    /// Part of the length of sharp edges that is in none of `features`, of chains that are as long as cells.
+    #[serde(default)]
+    pub left_out: f64,
 }
 
 /// An independent loop.

@@ -138,6 +138,7 @@ fn metric(atlas: &AffineAtlas) -> Metric {
             conformality: atlas.flow.conformality,
             adjusted: met.moved.to_least,
             merged: met.moved.merged,
+            left_out: met.left_out,
         }),
         history: history.clone(),
     }

@@ -8,8 +8,8 @@
 
 use super::error::ConeError;
 use super::request::RequestedCone;
-use crate::flow::features::{Feature, FeatureParams, features};
-use crate::flow::field::{FieldError, GridCones, cross_field, diffused, leans};
+use crate::flow::features::{Feature, FeatureParams, Features, features};
+use crate::flow::field::{FieldError, GridCones, cross_field, diffused, leans, open_narrow};
 use crate::flow::looped::LoopedSurface;
 use crate::flow::metric::face_lengths;
 use crate::flow::opened::Opened;
@@ -46,7 +46,10 @@ pub(super) fn select(
     named: &[EdgeId],
     count: Option<usize>,
 ) -> Result<(Vec<RequestedCone>, FromField), ConeError> {
-    let mut kept = features(mesh, params, named);
+    let Features {
+        chains: mut kept,
+        left_out,
+    } = features(mesh, params, named);
     let mut crowded = Vec::new();
     loop {
         match along(mesh, &kept, params, count) {
@@ -60,6 +63,7 @@ pub(super) fn select(
                 let (cones, mut found) = result?;
                 found.features = kept;
                 found.crowded = crowded;
+                found.left_out = left_out;
                 return Ok((cones, found));
             }
         }
@@ -102,7 +106,8 @@ fn along(
     let is_border = |h| !is_feature[surface.connectivity.edge(h)];
     let mut lean = leans(own, &angle, &length, is_border, RAGGED * size);
     let even = diffused(own, &angle, &area, NEAR * size).map_err(FieldError::from)?;
-    own.halfedges().for_each(|h| lean[h] += even[h]);
+    let narrow = open_narrow(own, &angle, &area, &length);
+    own.halfedges().for_each(|h| lean[h] += even[h] + narrow[h]);
     let mut field = cross_field(own, &angle, &area, &pull, &lean)?;
     let asked = GridCones {
         least: LEAST_QUARTERS,
@@ -151,6 +156,7 @@ fn along(
         ground: Arc::new((opened, ground)),
         features: Vec::new(),
         crowded: Vec::new(),
+        left_out: 0.0,
         field,
         signature,
         moved,

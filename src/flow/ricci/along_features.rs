@@ -27,6 +27,11 @@ use std::sync::Arc;
 /// Most Newton steps as long as features may be given up: those that can be met are met in fewer.
 const STEPS_WITH_FEATURES: usize = 40;
 
+/// Most features that are tried again one by one, after they were given up with others, …
+const MOST_AGAIN: usize = 8;
+/// … on surfaces of at most so many vertices, where an attempt takes little time.
+const MOST_VERTICES: usize = 5_000;
+
 /// Cones and turnings of a field, with as many of its features as lines as Newton's method can meet.
 pub(super) fn flow(
     surface: Surface,
@@ -35,111 +40,150 @@ pub(super) fn flow(
     observer: &dyn Observer,
 ) -> Result<FlatMetric, FlowError> {
     let c = surface.connectivity;
-    let all = edges_of(from.features.iter());
     let mut is_held = vec![true; from.features.len()];
+    let attempt = |is_held: &[bool]| attempt(&surface, from, is_held, params, observer);
     // Twice as many every time, so that few attempts are needed.
     let mut given_up = 1;
-    loop {
-        let held = || {
-            let features = from.features.iter().zip(&is_held);
-            features.filter(|(_, held)| **held).map(|(f, _)| f)
-        };
-        let is_whole = is_held.iter().all(|held| *held);
-        let ground = match is_whole {
-            true => from.ground.clone(),
-            false => {
-                let opened = Opened::new(c, &edges_of(held()))?;
-                let length = surface.source_length;
-                let ground = SurfaceDelaunay::along_features(c, length, &opened, &all)?;
-                Arc::new((opened, ground))
-            }
-        };
-        let (opened, ground) = &*ground;
-        let on = LoopedSurface::along_features(opened, ground)?;
-        let signature = match is_whole {
-            true => from.signature.clone(),
-            false => without(from, &is_held, &on)?,
-        };
-        // The feature of every pair of sides.
-        let features = from
-            .features
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| is_held[*i]);
-        let owner = features.flat_map(|(i, f)| f.edges.iter().map(move |_| i));
-        let (owner, glued): (Vec<usize>, _) = (owner.collect(), on.glued.concat());
-        let sought = Sought {
-            surface: &opened.connectivity,
-            ground,
-            on: &on,
-            signature: &signature,
-        };
-        let found = match held().next() {
-            Some(_) => {
-                let max_steps = params.max_newton_steps.min(STEPS_WITH_FEATURES);
-                sought.from(&sought.log_length(), params, max_steps, observer)
-            }
-            None => {
-                let conformal = || conformal(surface, &signature, params, observer);
-                sought.without_features(params, conformal, observer)
-            }
-        };
-        let mut metric = match found {
-            Ok(metric) => metric,
-            Err(error) => {
-                let held = (0..is_held.len()).filter(|&i| is_held[i]);
-                let held: Vec<usize> = held.collect();
-                if held.is_empty() {
-                    return Err(error);
-                }
-                tracing::debug!(%error, lines = held.len(), "with fewer features");
-                let of_side = |edge: EdgeId| {
-                    let side = glued.iter().position(|&e| e == edge)?;
-                    owner.get(side / 2).copied()
-                };
-                let first = match &error {
-                    FlowError::Seamless(SeamlessError::Stalled { missing, .. }) => {
-                        hardest(&from.features, held, opened, missing)
-                    }
-                    FlowError::Seamless(SeamlessError::NoLine { edge })
-                    | FlowError::Lines(StraightenError::Bent { edge }) => {
-                        let bent = of_side(*edge);
-                        let rest = held.into_iter().rev().filter(|i| Some(*i) != bent);
-                        bent.into_iter().chain(rest).collect()
-                    }
-                    FlowError::Lines(StraightenError::Correspondence(_))
-                    | FlowError::Seamless(
-                        SeamlessError::BrokenFaces { .. }
-                        | SeamlessError::TooDense { .. }
-                        | SeamlessError::Infeasible(_)
-                        | SeamlessError::Solve(_),
-                    ) => held.into_iter().rev().collect(),
-                    _ => return Err(error),
-                };
+    let (mut metric, mut ground) = loop {
+        match attempt(&is_held) {
+            Ok(found) => break found,
+            Err(Failed { error, first }) if first.is_empty() => return Err(error),
+            Err(Failed { error, first }) => {
+                tracing::debug!(%error, lines = first.len(), "with fewer features");
                 for which in first.into_iter().take(given_up) {
                     is_held[which] = false;
                 }
                 given_up *= 2;
-                continue;
             }
-        };
-        let features = from.features.iter().zip(&is_held);
-        let (lines, others): (Vec<_>, Vec<_>) = features.partition(|(_, held)| **held);
-        let cloned = |features: Vec<(&Feature, &bool)>| -> Vec<Feature> {
-            features.into_iter().map(|(f, _)| f.clone()).collect()
-        };
-        if let Some(record) = &mut metric.quarter_turns {
-            record.moved = from.moved;
-            record.lines = cloned(lines);
-            record.given_up = [cloned(others), from.crowded.clone()].concat();
         }
-        if held().next().is_some() {
-            metric.log_scale = joined_scale(&metric.log_scale, opened, c.vertex_count());
-            metric.curvature = joined_curvature(&metric.curvature, opened, c);
-            metric.opened = Some(Box::new(opened.clone()));
+    };
+    let others: Vec<usize> = (0..is_held.len()).filter(|&i| !is_held[i]).collect();
+    if others.len() > 1 && c.vertex_count() <= MOST_VERTICES {
+        for which in others.into_iter().take(MOST_AGAIN) {
+            is_held[which] = true;
+            match attempt(&is_held) {
+                Ok(found) => (metric, ground) = found,
+                Err(Failed { error, .. }) => {
+                    tracing::debug!(%error, which, "a feature is given up again");
+                    let cancelled = FlowError::Seamless(SeamlessError::Cancelled);
+                    if error == FlowError::Cancelled || error == cancelled {
+                        return Err(error);
+                    }
+                    is_held[which] = false;
+                }
+            }
         }
-        return Ok(metric);
     }
+    let opened = &ground.0;
+    let features = from.features.iter().zip(&is_held);
+    let (lines, others): (Vec<_>, Vec<_>) = features.partition(|(_, held)| **held);
+    let cloned = |features: &[(&Feature, &bool)]| -> Vec<Feature> {
+        features.iter().map(|(f, _)| (*f).clone()).collect()
+    };
+    if let Some(record) = &mut metric.quarter_turns {
+        record.moved = from.moved;
+        record.lines = cloned(&lines);
+        record.given_up = [cloned(&others), from.crowded.clone()].concat();
+        record.left_out = from.left_out;
+    }
+    if !lines.is_empty() {
+        metric.log_scale = joined_scale(&metric.log_scale, opened, c.vertex_count());
+        metric.curvature = joined_curvature(&metric.curvature, opened, c);
+        metric.opened = Some(Box::new(opened.clone()));
+    }
+    Ok(metric)
+}
+
+/// Why there is no metric with some features as lines.
+struct Failed {
+    error: FlowError,
+    /// Which of them may be in the way, the likeliest first; empty where others would not help.
+    first: Vec<usize>,
+}
+
+impl<E: Into<FlowError>> From<E> for Failed {
+    fn from(error: E) -> Self {
+        Self {
+            error: error.into(),
+            first: Vec::new(),
+        }
+    }
+}
+
+/// The metric with these features as lines, and the surface that is cut open along them.
+fn attempt(
+    surface: &Surface,
+    from: &FromField,
+    is_held: &[bool],
+    params: &FlowParams,
+    observer: &dyn Observer,
+) -> Result<(FlatMetric, Arc<(Opened, SurfaceDelaunay)>), Failed> {
+    let c = surface.connectivity;
+    let held: Vec<usize> = (0..is_held.len()).filter(|&i| is_held[i]).collect();
+    let is_whole = held.len() == is_held.len();
+    let ground = match is_whole {
+        true => from.ground.clone(),
+        false => {
+            let opened = Opened::new(c, &edges_of(held.iter().map(|&i| &from.features[i])))?;
+            let (all, length) = (edges_of(from.features.iter()), surface.source_length);
+            let ground = SurfaceDelaunay::along_features(c, length, &opened, &all)?;
+            Arc::new((opened, ground))
+        }
+    };
+    let (opened, on_it) = &*ground;
+    let on = LoopedSurface::along_features(opened, on_it)?;
+    let signature = match is_whole {
+        true => from.signature.clone(),
+        false => without(from, is_held, &on)?,
+    };
+    let sought = Sought {
+        surface: &opened.connectivity,
+        ground: on_it,
+        on: &on,
+        signature: &signature,
+    };
+    let found = match held.is_empty() {
+        false => {
+            let max_steps = params.max_newton_steps.min(STEPS_WITH_FEATURES);
+            sought.from(&sought.log_length(), params, max_steps, observer)
+        }
+        true => {
+            let conformal = || conformal(*surface, &signature, params, observer);
+            sought.without_features(params, conformal, observer)
+        }
+    };
+    let error = match found {
+        Ok(metric) => return Ok((metric, ground)),
+        Err(error) => error,
+    };
+    // The feature of a side.
+    let of_side = |edge: EdgeId| {
+        let owner = held
+            .iter()
+            .flat_map(|&i| from.features[i].edges.iter().map(move |_| i));
+        let side = on.glued.concat().iter().position(|&e| e == edge)?;
+        owner.into_iter().nth(side / 2)
+    };
+    let first = match &error {
+        FlowError::Seamless(SeamlessError::Stalled { missing, .. }) => {
+            hardest(&from.features, &held, opened, missing)
+        }
+        FlowError::Seamless(SeamlessError::NoLine { edge })
+        | FlowError::Lines(StraightenError::Bent { edge }) => {
+            let bent = of_side(*edge);
+            let rest = held.iter().rev().copied().filter(|&i| Some(i) != bent);
+            bent.into_iter().chain(rest).collect()
+        }
+        FlowError::Lines(StraightenError::Correspondence(_))
+        | FlowError::Seamless(
+            SeamlessError::BrokenFaces { .. }
+            | SeamlessError::TooDense { .. }
+            | SeamlessError::Infeasible(_)
+            | SeamlessError::Solve(_),
+        ) => held.iter().rev().copied().collect(),
+        _ => Vec::new(),
+    };
+    Err(Failed { error, first })
 }
 
 /// The conformal metric with the cones of a signature; borders are straight between corners.
@@ -164,7 +208,7 @@ fn conformal(
 /// Features in order of what is missing at their vertices, most first; of equal ones the least important first. `held`: by importance.
 fn hardest(
     features: &[Feature],
-    held: Vec<usize>,
+    held: &[usize],
     opened: &Opened,
     missing: &VertexVec<f64>,
 ) -> Vec<usize> {
@@ -173,7 +217,7 @@ fn hardest(
         at[v] += missing[sector] * missing[sector];
     }
     let sum = |i: usize| features[i].vertices.iter().map(|&v| at[v]).sum::<f64>();
-    let mut first: Vec<(f64, usize)> = held.into_iter().rev().map(|i| (sum(i), i)).collect();
+    let mut first: Vec<(f64, usize)> = held.iter().rev().map(|&i| (sum(i), i)).collect();
     first.sort_by(|a, b| b.0.total_cmp(&a.0));
     first.into_iter().map(|(_, i)| i).collect()
 }

@@ -21,6 +21,8 @@ pub struct QuarterTurns {
     pub lines: Vec<Feature>,
     /// Those that could not be.
     pub given_up: Vec<Feature>,
+    /// Part of the length of sharp edges that is in neither, see [`Features`](crate::flow::features::Features).
+    pub left_out: f64,
 }
 
 /// A flat metric with cones, and how it was reached.

@@ -20,7 +20,6 @@ use crate::export::glb::marked::{self, Marked};
 use crate::export::manifest::{Manifest, Record, State};
 use crate::flow::cones;
 use crate::flow::cones::Requests;
-use crate::flow::features;
 use crate::geometry::mesh::Soup;
 use crate::outcome::{Failure, FailureKind};
 use crate::read::atlas::{FolderError, component_folders};
@@ -172,10 +171,6 @@ fn flat(
     let frame = component.frame;
     let mesh = prepared_at_first(component.mesh?, requests, config)?;
     let prescription = prescribed(&mesh, requests, config)?;
-    let unfollowed = match config.domain() {
-        Domain::Grid => features::left_out(&mesh, &config.features),
-        Domain::Flat => None,
-    };
     let Flattened {
         mesh,
         metric,
@@ -183,11 +178,7 @@ fn flat(
         ..
     } = flatten(mesh, prescription, config, &(), &|_| Ok(()))?;
     let turns = metric.quarter_turns.as_ref();
-    let turns = turns.map_or_else(Vec::new, |met| {
-        let mut lines = turns::describe(&turns::of(met, &mesh));
-        lines.extend(unfollowed.and_then(turns::unfollowed));
-        lines
-    });
+    let turns = turns.map_or_else(Vec::new, |met| turns::describe(&turns::of(met, &mesh)));
     let domain = config.domain();
     let flat = Flat::of(&mesh, &metric, &prescription, &frame, domain);
     Ok((flat, turns))

@@ -5,17 +5,23 @@ use crate::flow::features::Feature;
 use crate::flow::ricci::QuarterTurns;
 use crate::geometry::ids::{NONE, VertexId};
 use crate::geometry::mesh::Mesh;
-use crate::read::metric::StoredTurns;
+use crate::read::metric::{FeatureEnd, NoLine, StoredTurns};
 
 /// Loops and features that are told of one by one.
 const TOLD: usize = 12;
 
 /// What a build would store.
 pub(super) fn of(met: &QuarterTurns, mesh: &Mesh) -> StoredTurns {
-    let name = |v: Option<&VertexId>| v.map(|&v| mesh.source_vertex[v]).filter(|&v| v != NONE);
+    let end = |v: VertexId| FeatureEnd {
+        vertex: Some(mesh.source_vertex[v]).filter(|&v| v != NONE),
+        position: mesh.positions[v],
+    };
     let given_up = |f: &Feature| {
-        let ends = [name(f.vertices.first()), name(f.vertices.last())];
-        (f.edges.len(), ends)
+        let (&from, &to) = (f.vertices.first()?, f.vertices.last()?);
+        Some(NoLine {
+            edges: f.edges.len(),
+            ends: [end(from), end(to)],
+        })
     };
     StoredTurns {
         loops: met.loops.clone(),
@@ -23,18 +29,9 @@ pub(super) fn of(met: &QuarterTurns, mesh: &Mesh) -> StoredTurns {
         adjusted: met.moved.to_least,
         merged: met.moved.merged,
         lines: met.lines.len(),
-        given_up: met.given_up.iter().map(given_up).collect(),
+        given_up: met.given_up.iter().filter_map(given_up).collect(),
+        left_out: met.left_out,
     }
-}
-
-/// What is said of the part of sharp edges, by length, that is in no feature.
-pub(super) fn unfollowed(part: f64) -> Option<String> {
-    let percent = 100.0 * part;
-    (percent >= 0.5).then(|| {
-        format!(
-            "{percent:.0} % of the length of sharp edges (features.angle) is in no feature, since their chains are too short, lose themselves, or are as often ridge as valley: edges that shall be lines all the same can be named in features.file"
-        )
-    })
 }
 
 /// Sentences; vertices are named as in the input file.
@@ -80,16 +77,25 @@ pub(super) fn describe(met: &StoredTurns) -> Vec<String> {
             met.lines
         ));
     }
-    let name = |v: Option<u32>| v.map_or("a new one".to_owned(), |v| v.to_string());
-    let given_up = |feature: &(usize, [Option<u32>; 2])| {
-        let (edges, [from, to]) = *feature;
-        format!(
-            "no line: {} from vertex {} to vertex {}",
-            counted(edges, "edge", "edges"),
-            name(from),
-            name(to)
-        )
+    let name = |end: &FeatureEnd| {
+        let [x, y, z] = end.position;
+        let vertex = match end.vertex {
+            Some(v) => format!("vertex {v} of the file"),
+            None => "a new vertex".to_owned(),
+        };
+        format!("{vertex} (near {x:.4}, {y:.4}, {z:.4})")
+    };
+    let given_up = |feature: &NoLine| {
+        let [from, to] = &feature.ends;
+        let edges = counted(feature.edges, "edge", "edges");
+        format!("no line: {edges} from {} to {}", name(from), name(to))
     };
     lines.extend(met.given_up.iter().take(TOLD).map(given_up));
+    let percent = 100.0 * met.left_out;
+    if percent >= 0.5 {
+        lines.push(format!(
+            "{percent:.0} % of the length of sharp edges is in no feature: their chains are short or narrow, or as often ridge as valley; edges that shall be lines all the same can be named in features.file"
+        ));
+    }
     lines
 }

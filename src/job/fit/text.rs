@@ -19,14 +19,15 @@ impl fmt::Display for FittedAsset {
                 c.corners,
                 plural(c.corners),
             )?;
-            let source = c.from_source;
+            let (source, diagonal) = (c.from_source, c.diagonal_source_units);
             writeln!(
                 f,
-                "  from the mesh: RMS {:.3e}, at most {:.3e} (of the diagonal {:.6} {}); normals {:.2} degrees off on average, 95 % within {:.2}",
+                "  from the mesh, {}: RMS {:.3e}, at most {:.3e} ({:.1e} and {:.1e} of the diagonal); normals {:.2} degrees off on average, 95 % within {:.2}",
+                self.params.unit.name(),
+                source.rms_of_diagonal * diagonal,
+                source.max_of_diagonal * diagonal,
                 source.rms_of_diagonal,
                 source.max_of_diagonal,
-                c.diagonal_source_units,
-                self.params.unit.name(),
                 c.normal_deviation.mean_degrees,
                 c.normal_deviation.p95_degrees,
             )?;
