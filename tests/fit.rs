@@ -69,14 +69,16 @@ fn main() {
     let has_readers = has_modules("numpy, OCP, pxr");
     for file in READ {
         let model = folder.join(file);
-        let trial = Trial::test(format!("read/{file}"), move || is_read(&model));
+        let trial = Trial::test(format!("read/{file}"), move || is_read(&model, 2000));
         trials.push(trial.with_ignored_flag(is_ignored || !has_readers));
     }
     for file in FIXTURES {
         let model = Path::new("fixtures/good").join(file);
-        let trial = Trial::test(format!("read/{file}"), move || is_read(&model));
+        let trial = Trial::test(format!("read/{file}"), move || is_read(&model, 2000));
         trials.push(trial.with_ignored_flag(!is_ignored || !has_readers));
     }
+    let trial = Trial::test("read/hollow", hollow_is_read);
+    trials.push(trial.with_ignored_flag(!has_readers));
     libtest_mimic::run(&arguments, trials).exit();
 }
 
@@ -169,10 +171,55 @@ fn is_near(model: &Path, file: &str) -> Result<(), Failed> {
 /// Places of cells at which limit positions are compared.
 const PLACES: [[f64; 2]; 5] = [[0.0, 0.0], [0.5, 0.0], [0.5, 0.5], [0.25, 0.75], [1.0, 1.0]];
 
-/// OpenCASCADE, USD, an evaluator of Catmull–Clark surfaces and G+Smo find nothing wrong.
-fn is_read(model: &Path) -> Result<(), Failed> {
+/// A box with a cavity is one solid with two shells, as large as both surfaces together say.
+fn hollow_is_read() -> Result<(), Failed> {
     let folder = tempfile::tempdir()?;
-    let asset = fitted(model, 2000)?;
+    let model = folder.path().join("hollow.obj");
+    let mut text = String::new();
+    for [low, high] in [
+        [[0.0, 0.0, 0.0], [5.0, 4.0, 3.0]],
+        [[0.4; 3], [4.8, 3.5, 2.2]],
+    ] {
+        for i in 0..8 {
+            let at = |axis: usize| {
+                if i >> axis & 1 == 1 {
+                    high[axis]
+                } else {
+                    low[axis]
+                }
+            };
+            writeln!(text, "v {} {} {}", at(0), at(1), at(2))?;
+        }
+    }
+    let quads = [
+        [1, 3, 4, 2],
+        [5, 6, 8, 7],
+        [1, 2, 6, 5],
+        [3, 7, 8, 4],
+        [1, 5, 7, 3],
+        [2, 4, 8, 6],
+    ];
+    for [a, b, c, d] in quads {
+        writeln!(text, "f {a} {b} {c} {d}")?;
+        writeln!(text, "f {} {} {} {}", d + 8, c + 8, b + 8, a + 8)?;
+    }
+    std::fs::write(&model, text)?;
+    let document = fitted(&model, 100)?.document();
+    let solids: Vec<_> = document
+        .components
+        .iter()
+        .map(|c| c.void_of.as_deref())
+        .collect();
+    if solids != [None, Some("component-000")] {
+        return Err(format!("cavities of {solids:?}").into());
+    }
+    is_read(&model, 100)
+}
+
+/// OpenCASCADE, USD, an evaluator of Catmull–Clark surfaces and G+Smo find nothing wrong.
+fn is_read(model: &Path, cells: usize) -> Result<(), Failed> {
+    let folder = tempfile::tempdir()?;
+    let asset = fitted(model, cells)?;
     asset.write(folder.path(), "fit")?;
     let mut command = Command::new(python());
     command

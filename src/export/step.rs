@@ -1,9 +1,9 @@
 //! Spline shells as STEP AP242, in the text of ISO 10303-21.
 //!
-//! *Enters:* [`Shell`]s with names, and the unit of their coordinates. *Leaves:* the text of a file with one product. *Guaranteed:*
+//! *Enters:* [`Body`]s, and the unit of their coordinates. *Leaves:* the text of a file with one product. *Guaranteed:*
 //! numbers are read back to the last bit; equal shells give equal bytes, since the file holds no time, path or user.
 //!
-//! Each shell is one item of the product and carries its name. A closed shell is a solid (`MANIFOLD_SOLID_BREP`), an open one a
+//! Each body is one item of the product and carries its name. A closed shell is a solid (`MANIFOLD_SOLID_BREP`, with cavities `BREP_WITH_VOIDS`), an open one a
 //! surface model (`SHELL_BASED_SURFACE_MODEL`). Where all are of one kind, they stand in the representation for that kind, otherwise
 //! in a plain `SHAPE_REPRESENTATION`. Faces, edges and vertices are shared within a shell, and each face is the whole of its
 //! surface. There are no curves in parameter space: programs find them from the edges.
@@ -111,23 +111,37 @@ impl LengthUnit {
     }
 }
 
+/// A shell, with those of cavities where it bounds a solid.
+#[derive(Clone, Debug)]
+pub struct Body<'a> {
+    /// Name.
+    pub name: &'a str,
+    /// The only shell, or the outer one.
+    pub shell: &'a Shell,
+    /// Closed shells inside it, whose normals point into the cavity.
+    pub voids: Vec<&'a Shell>,
+}
+
 /// Writes the file.
 ///
 /// # Errors
 /// Those of the writer. [`io::ErrorKind::InvalidInput`] where a shell has no faces, a number is not finite, an index has no
 /// target, or knots and control points do not fit; then nothing has been written.
-pub fn write(
-    shells: &[(String, &Shell)],
-    unit: LengthUnit,
-    out: &mut impl Write,
-) -> io::Result<()> {
-    for (name, shell) in shells {
-        check(shell).map_err(|what| {
+pub fn write(bodies: &[Body<'_>], unit: LengthUnit, out: &mut impl Write) -> io::Result<()> {
+    for Body { name, shell, voids } in bodies {
+        let mut shells = std::iter::once(shell).chain(voids);
+        let are_proper = shells.try_for_each(|shell| check(shell));
+        let is_solid = shell.is_closed && voids.iter().all(|void| void.is_closed);
+        let checked = match voids.is_empty() || is_solid {
+            true => are_proper,
+            false => Err("a cavity of or with a shell that is not closed"),
+        };
+        checked.map_err(|what| {
             io::Error::new(io::ErrorKind::InvalidInput, format!("{name}: {what}"))
         })?;
     }
-    let product = match shells {
-        [(name, _)] => quoted(name),
+    let product = match bodies {
+        [Body { name, .. }] => quoted(name),
         _ => quoted("components"),
     };
     write!(out, "{HEADER}{START}")?;
@@ -138,18 +152,30 @@ pub fn write(
         last: RESERVED,
     };
     let mut items = vec![FRAME];
-    for (name, shell) in shells {
+    for Body { name, shell, voids } in bodies {
         let (name, faces) = (quoted(name), list(data.faces(shell)?));
         items.push(if shell.is_closed {
             let shell = data.add(format_args!("CLOSED_SHELL('',{faces})"))?;
-            data.add(format_args!("MANIFOLD_SOLID_BREP({name},{shell})"))?
+            let mut inner = Vec::with_capacity(voids.len());
+            for void in voids {
+                let faces = list(data.faces(void)?);
+                let void = data.add(format_args!("CLOSED_SHELL('',{faces})"))?;
+                inner.push(data.add(format_args!("ORIENTED_CLOSED_SHELL('',*,{void},.T.)"))?);
+            }
+            match inner.is_empty() {
+                true => data.add(format_args!("MANIFOLD_SOLID_BREP({name},{shell})"))?,
+                false => {
+                    let inner = list(inner);
+                    data.add(format_args!("BREP_WITH_VOIDS({name},{shell},{inner})"))?
+                }
+            }
         } else {
             // OpenCASCADE takes the name of an open one from here.
             let shell = data.add(format_args!("OPEN_SHELL({name},{faces})"))?;
             data.add(format_args!("SHELL_BASED_SURFACE_MODEL({name},({shell}))"))?
         });
     }
-    let has = |closed| shells.iter().any(|(_, shell)| shell.is_closed == closed);
+    let has = |closed| bodies.iter().any(|body| body.shell.is_closed == closed);
     let kind = match (has(true), has(false)) {
         (true, false) => "ADVANCED_BREP_",
         (false, true) => "MANIFOLD_SURFACE_",
@@ -347,187 +373,4 @@ fn quoted(plain: &str) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::collections::BTreeMap;
-
-    /// The unit cube. Vertex i has the bits of i as coordinates.
-    fn cube() -> Shell {
-        let corner = |i: u32| [i & 1, i >> 1 & 1, i >> 2 & 1].map(f64::from);
-        let mut edges: Vec<Edge> = Vec::new();
-        let quads = [0o0231, 0o4576, 0o0154, 0o2673, 0o0462, 0o1375];
-        let faces = quads.map(|quad: u32| {
-            let ring = [9, 6, 3, 0].map(|shift| quad >> shift & 7);
-            let [a, b, _, d] = ring.map(corner);
-            let at = |i: usize| {
-                let (u, v) = ((i % 4) as f64 / 3.0, (i / 4) as f64 / 3.0);
-                [0, 1, 2].map(|c| a[c] + u * (b[c] - a[c]) + v * (d[c] - a[c]))
-            };
-            let knots = [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
-            let surface = BSplineSurface {
-                knots: [knots.to_vec(), knots.to_vec()],
-                control: (0..16).map(at).collect(),
-            };
-            let border = (0..4).map(|side| {
-                let ends = [ring[side], ring[(side + 1) % 4]];
-                let known = edges.iter().position(|e| e.ends == [ends[1], ends[0]]);
-                let edge = known.unwrap_or(edges.len());
-                if known.is_none() {
-                    let mut curve = surface.side(side);
-                    if side > 1 {
-                        curve.control.reverse();
-                    }
-                    edges.push(Edge { ends, curve });
-                }
-                (edge as u32, known.is_none())
-            });
-            Face {
-                border: border.collect(),
-                surface,
-            }
-        });
-        Shell {
-            vertices: (0..8).map(corner).collect(),
-            edges,
-            faces: faces.into(),
-            is_closed: true,
-        }
-    }
-
-    fn file(shells: &[(&str, &Shell)], unit: LengthUnit) -> io::Result<String> {
-        let named: Vec<_> = shells.iter().map(|&(n, s)| (n.to_owned(), s)).collect();
-        let mut out = Vec::new();
-        write(&named, unit, &mut out)?;
-        String::from_utf8(out).map_err(io::Error::other)
-    }
-
-    /// Entities by number, in one line each.
-    fn entities(file: &str) -> BTreeMap<u64, String> {
-        let data = file.split("DATA;\n").nth(1).unwrap();
-        let data = data.split("ENDSEC;").next().unwrap();
-        let mut all = BTreeMap::new();
-        for entity in data.split_terminator(";\n") {
-            let (number, entity) = entity.split_once('=').unwrap();
-            let number = number.strip_prefix('#').unwrap().parse().unwrap();
-            assert!(all.insert(number, entity.replace('\n', "")).is_none());
-        }
-        all
-    }
-
-    fn count(file: &str, kind: &str) -> usize {
-        let start = format!("{kind}(");
-        entities(file)
-            .values()
-            .filter(|e| e.starts_with(&start))
-            .count()
-    }
-
-    /// The lists of numbers in an entity.
-    fn lists(entity: &str) -> Vec<Vec<f64>> {
-        let list = |l: &str| l.split(',').map(|x| x.parse().ok()).collect();
-        entity.split(['(', ')']).filter_map(list).collect()
-    }
-
-    #[test]
-    fn cube_is_whole() {
-        let text = file(&[("cube", &cube())], LengthUnit::Millimetre).unwrap();
-        let all = entities(&text);
-        for entity in all.values() {
-            for reference in entity.split('#').skip(1) {
-                let digits = reference.split([',', ')']).next().unwrap();
-                assert!(all.contains_key(&digits.parse().unwrap()), "{entity}");
-            }
-        }
-        for (kind, expected) in [
-            ("VERTEX_POINT", 8),
-            ("EDGE_CURVE", 12),
-            ("ORIENTED_EDGE", 24),
-            ("ADVANCED_FACE", 6),
-            ("CLOSED_SHELL", 1),
-            ("MANIFOLD_SOLID_BREP", 1),
-            ("ADVANCED_BREP_SHAPE_REPRESENTATION", 1),
-            ("SHAPE_DEFINITION_REPRESENTATION", 1),
-        ] {
-            assert_eq!(count(&text, kind), expected, "{kind}");
-        }
-        let again = file(&[("cube", &cube())], LengthUnit::Millimetre).unwrap();
-        assert_eq!(text, again);
-    }
-
-    #[test]
-    fn multiplicities_fit_control_points() {
-        let mut shell = cube();
-        let curve = &mut shell.edges[0].curve;
-        curve.knots = vec![0.0, 0.0, 0.0, 0.0, 0.25, 0.5, 0.5, 1.0, 1.0, 1.0, 1.0];
-        curve.control = (0..7).map(|i| [f64::from(i), 1e-9, 1e300]).collect();
-        let surface = &mut shell.faces[0].surface;
-        surface.knots[1].insert(4, 0.5);
-        surface.control.extend([[0.5; 3]; 4]);
-        let text = file(&[("", &shell)], LengthUnit::Inch).unwrap();
-        let all = entities(&text);
-        let of = |kind| all.values().filter(move |e| e.starts_with(kind));
-        for curve in of("B_SPLINE_CURVE") {
-            let multiplicity: f64 = lists(curve)[0].iter().sum();
-            assert_eq!(multiplicity, curve.matches('#').count() as f64 + 4.0);
-        }
-        let first = of("B_SPLINE_CURVE").next().unwrap();
-        assert!(first.ends_with("(4,1,2,4),(0.,0.25,0.5,1.),.UNSPECIFIED.)"));
-        // Four lists, one for each control point in u, of five.
-        let first = of("B_SPLINE_SURFACE").next().unwrap();
-        let points = first.split("),(").map(|list| list.matches('#').count());
-        assert_eq!(points.collect::<Vec<_>>(), [5, 5, 5, 5, 0, 0, 0]);
-        assert!(first.ends_with("(4,4),(4,1,4),(0.,1.),(0.,0.5,1.),.UNSPECIFIED.)"));
-        for point in of("CARTESIAN_POINT") {
-            let numbers = point.split(['(', ')']).nth(2).unwrap();
-            assert!(numbers.split(',').all(|x| x.contains('.')), "{point}");
-        }
-    }
-
-    #[test]
-    fn numbers_are_read_back() {
-        let texts = [1.0, -0.0, 1.5e-7, 1e300].map(real);
-        assert_eq!(texts, ["1.", "0.", "1.5E-7", "1.E300"]);
-        for x in [0.1, 1.0 / 3.0, -2.5e-308, f64::MAX, 1e16, 123_456.789] {
-            assert_eq!(real(x).parse(), Ok(x));
-        }
-    }
-
-    #[test]
-    fn strings_are_escaped() {
-        assert_eq!(quoted("it's a\\b"), "'it''s a\\\\b'");
-        assert_eq!(quoted("Größe"), "'Gr\\X2\\00F6\\X0\\\\X2\\00DF\\X0\\e'");
-        assert_eq!(quoted("é😀"), "'\\X2\\00E9\\X0\\\\X4\\0001F600\\X0\\'");
-        assert_eq!(quoted("\n"), "'\\X2\\000A\\X0\\'");
-    }
-
-    #[test]
-    fn kinds_may_be_mixed() {
-        let (closed, mut open) = (cube(), cube());
-        open.faces.pop();
-        open.is_closed = false;
-        let text = file(&[("open", &open)], LengthUnit::Inch).unwrap();
-        assert_eq!(count(&text, "MANIFOLD_SURFACE_SHAPE_REPRESENTATION"), 1);
-        assert!(text.contains("CONVERSION_BASED_UNIT('INCH'"));
-        let text = file(&[("a", &open), ("b", &closed)], LengthUnit::Inch).unwrap();
-        for kind in ["SHAPE_REPRESENTATION", "OPEN_SHELL", "CLOSED_SHELL"] {
-            assert_eq!(count(&text, kind), 1, "{kind}");
-        }
-    }
-
-    #[test]
-    fn what_step_cannot_hold_is_refused() {
-        let spoilt: [fn(&mut Shell); 5] = [
-            |shell| shell.faces.clear(),
-            |shell| shell.vertices[3][1] = f64::NAN,
-            |shell| shell.edges[0].ends[1] = 8,
-            |shell| shell.faces[5].border[0].0 = 12,
-            |shell| shell.faces[2].surface.knots[1].truncate(2),
-        ];
-        for spoil in spoilt {
-            let mut shell = cube();
-            spoil(&mut shell);
-            let error = file(&[("", &shell)], LengthUnit::Centimetre).unwrap_err();
-            assert_eq!(error.kind(), io::ErrorKind::InvalidInput);
-        }
-    }
-}
+mod tests;

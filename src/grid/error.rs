@@ -141,7 +141,7 @@ pub enum GridError {
     },
     /// Too much of the surface is too rough for its cells.
     #[error(
-        "cells would be stretched more than sevenfold on {:.0} % of the surface's area, and a grid has at most {:.0} %: the surface is rougher than its cells: smooth it, or ask for more cells (grid.cells)", 100.0 * squeezed, 100.0 * most
+        "cells would be stretched more than sevenfold on {:.0} % of the surface's area, and a grid has at most {:.0} %: the surface is rougher than its cells, or a low cones.count leaves it too few irregular points: smooth it, or ask for more cells (grid.cells), or for more cones", 100.0 * squeezed, 100.0 * most
     )]
     Rough {
         /// Part of the area.

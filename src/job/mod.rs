@@ -159,6 +159,9 @@ fn run_stages(
             Ok(())
         },
     )?;
+    if let Some(note) = warnings::without_folders(given, parts.len(), config) {
+        tracing::warn!(asset = id, "{note}");
+    }
     assembly.finish(publication, config, &outcome.notes)?;
     if untold > 0 {
         let page = output.join(&id).join("report.html");

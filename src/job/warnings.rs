@@ -14,6 +14,28 @@ const FEW_CELLS: usize = 200;
 /// A greater part of sharp edges that are no lines is told.
 const MOST_LEFT_OUT: f64 = 0.1;
 
+/// A greater part of irregular points among cells is told.
+const MOST_IRREGULAR: f64 = 0.1;
+
+/// What is said where a part of sharp edges is in no feature.
+pub(super) fn sharp_edges_left_out(part: f64) -> String {
+    format!(
+        "{:.0} % of the length of its sharp edges in no feature: they are short, or meet others at small angles; those that shall be lines all the same can be named in features.file",
+        100.0 * part
+    )
+}
+
+/// What is said where components are too many for folders.
+pub(super) fn without_folders(given: &str, components: usize, config: &Config) -> Option<String> {
+    let output = &config.output;
+    (!output.has_component_folders(components)).then(|| {
+        format!(
+            "{given} has {components} components, more than the {} of output.component_folders: surface.glb has them all and components.json their figures, and none has quads.obj, atlas.json or images of its own",
+            output.component_folders
+        )
+    })
+}
+
 /// What was asked for and could not be had, and much distortion, beginning with a verb.
 pub(super) fn warnings(atlas: &AffineAtlas, config: &Config) -> Vec<String> {
     let mut notes = Vec::new();
@@ -64,20 +86,27 @@ pub(super) fn warnings(atlas: &AffineAtlas, config: &Config) -> Vec<String> {
     if let Some(met) = &atlas.metric.quarter_turns
         && met.left_out > MOST_LEFT_OUT
     {
-        notes.push(format!(
-            "has {:.0} % of the length of its sharp edges in no feature: their chains are short or narrow, or as often ridge as valley; those that shall be lines all the same can be named in features.file",
-            100.0 * met.left_out
-        ));
+        notes.push(format!("has {}", sharp_edges_left_out(met.left_out)));
     }
     if let Some(grid) = &atlas.grid
         && grid.distortion.scaled_jacobian.not_positive > 0
     {
         let cells = grid.distortion.scaled_jacobian;
         notes.push(format!(
-            "has {} of {} cells that are turned over at a corner or flat there, drawn with straight edges (least scaled Jacobian {:.2}): where sharp edges meet at small angles, or the surface bends within a cell; for the latter, more cells (grid.cells)",
+            "has {} of {} cells that are turned over at a corner or flat there, drawn with straight edges (least scaled Jacobian {:.2}): where sharp edges meet at small angles, or the surface is rough or bends within a cell; fewer lines along edges (a larger features.angle) or more cells (grid.cells) can help",
             cells.not_positive,
             grid.cells(),
             cells.min
+        ));
+    }
+    if let Some(grid) = &atlas.grid
+        && grid.irregular().len() as f64 > MOST_IRREGULAR * grid.cells() as f64
+        && grid.cells() >= FEW_CELLS
+    {
+        notes.push(format!(
+            "has {} irregular points in {} cells: its surface is rough, or has many sharp edges; smoothing it, a larger features.angle (fewer lines along edges) or cones.count (fewer cones) gives fewer",
+            grid.irregular().len(),
+            grid.cells()
         ));
     }
     if let Some(reason) = &atlas.no_grid {

@@ -32,6 +32,7 @@ mod tensor;
 pub mod tessellation;
 #[cfg(test)]
 mod tests;
+pub mod voids;
 
 pub use error::SplineError;
 pub use gridded::Gridded;

@@ -80,6 +80,13 @@ fn more_components_than_folders_are_asked_for_have_files_of_all_only() {
             "surface.glb"
         ]
     );
+    // Where it may speak, it says so.
+    let mut loud = program();
+    loud.args(["build", "--set", FEWER, "--out"]);
+    let output = loud.arg(input.path().join("loud")).arg(&mesh).output();
+    let said = String::from_utf8_lossy(&output.expect("it runs").stderr).into_owned();
+    let sentence = "has 5 components, more than the 4 of output.component_folders";
+    assert_eq!(said.matches(sentence).count(), 1, "{said}");
     // Nothing is left of what was written to be checked.
     assert_eq!(names(&few).iter().filter(|n| n.contains("many")).count(), 1);
     for file in ["surface.glb", "preview.png"] {

@@ -28,6 +28,7 @@ mod real_models;
 mod rebuild;
 mod refusals;
 mod replacing;
+mod rough;
 mod schema;
 mod shapes;
 mod survey;

@@ -41,6 +41,9 @@ pub struct Component {
     pub name: String,
     /// True where it has no boundary.
     pub closed: bool,
+    /// Name of the component whose cavity it bounds: its faces are in the STEP file of that one, and it has none of its own. Absent where it bounds none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub void_of: Option<String>,
     /// Cells of the control mesh.
     pub cells: usize,
     /// Control points of the limit surface.
@@ -166,6 +169,7 @@ impl Component {
         Self {
             name: name.to_owned(),
             closed: faces.shell.is_closed,
+            void_of: None,
             cells: cage.cells.len(),
             control_points: cage.vertices,
             irregular_points: cage.irregular().iter().filter(|x| **x).count(),

@@ -103,6 +103,9 @@ fn table(body: &mut String, c: &Component, unit: &str) {
     row("normals off, 95 % (degrees)", figure(normals.p95_degrees));
     row("area turned over", figure(c.turned_over_area));
     row("least Jacobian over its mean", figure(c.least_jacobian));
+    if let Some(solid) = &c.void_of {
+        row("bounds a cavity of", solid.clone());
+    }
     row("STEP: faces", c.step.faces.to_string());
     row("STEP: control points", c.step.control_points.to_string());
     for (name, jump) in [

@@ -284,7 +284,7 @@ impl Flat {
     /// curvature lower the peaks (on spot from a factor of 6.0 to 2.0), but with as many cones raise the deviation.
     fn advice(&self, far: usize, peaks: &[(Mark, f64)]) -> Vec<String> {
         if self.domain == Domain::Grid {
-            return vec!["to change: a grid has its cones where its cross field turns, however many are asked for: a larger features.angle asks for fewer lines along edges, and images.domain = \"flat\" for no grid; flat patches take cones.count".to_owned()];
+            return vec!["to change: a grid has its cones where its cross field turns: a larger features.angle asks for fewer lines along edges, cones.count for at most so many cones, and images.domain = \"flat\" for no grid and cones where scales are most even".to_owned()];
         }
         let count = self.cones.len();
         let more = (2 * count).max(4);

@@ -5,6 +5,7 @@ use crate::flow::features::Feature;
 use crate::flow::ricci::QuarterTurns;
 use crate::geometry::ids::{NONE, VertexId};
 use crate::geometry::mesh::Mesh;
+use crate::job::warnings::sharp_edges_left_out;
 use crate::read::metric::{FeatureEnd, NoLine, StoredTurns};
 
 /// Loops and features that are told of one by one.
@@ -91,11 +92,8 @@ pub(super) fn describe(met: &StoredTurns) -> Vec<String> {
         format!("no line: {edges} from {} to {}", name(from), name(to))
     };
     lines.extend(met.given_up.iter().take(TOLD).map(given_up));
-    let percent = 100.0 * met.left_out;
-    if percent >= 0.5 {
-        lines.push(format!(
-            "{percent:.0} % of the length of sharp edges is in no feature: their chains are short or narrow, or as often ridge as valley; edges that shall be lines all the same can be named in features.file"
-        ));
+    if met.left_out >= 0.005 {
+        lines.push(format!("it has {}", sharp_edges_left_out(met.left_out)));
     }
     lines
 }

@@ -20,6 +20,8 @@ use crate::read::atlas::{FolderError, component_folders};
 use crate::read::gridded::read_gridded;
 use crate::spline::cad::Faces;
 use crate::spline::patches::Patches;
+use crate::spline::tessellation::Tessellation;
+use crate::spline::voids::{Closed, voids};
 use crate::spline::{self, Gridded, Spline, SplineError};
 use std::path::Path;
 
@@ -63,6 +65,8 @@ pub enum Size {
 pub struct FittedComponent {
     /// Name.
     pub name: String,
+    /// The component whose cavity this bounds, by its place among them: its faces are in that one's STEP file.
+    pub void_of: Option<usize>,
     /// Its surface.
     pub spline: Spline,
     /// The same for CAD.
@@ -190,6 +194,7 @@ pub fn fit(
         match fitted {
             Ok((spline, faces, patches)) => components.push(FittedComponent {
                 name,
+                void_of: None,
                 spline,
                 faces,
                 patches,
@@ -201,6 +206,7 @@ pub fn fit(
             }
         }
     }
+    set_voids(&mut components);
     match first {
         Some(error) if components.is_empty() => Err(error),
         _ => Ok(FittedAsset {
@@ -208,6 +214,26 @@ pub fn fit(
             unfitted,
             params: *params,
         }),
+    }
+}
+
+/// Finds out which components bound cavities of others.
+fn set_voids(components: &mut [FittedComponent]) {
+    let is_closed = |c: &&FittedComponent| c.faces.shell.is_closed;
+    if components.iter().filter(is_closed).count() < 2 {
+        return;
+    }
+    let closed = |c: &FittedComponent| is_closed(&c).then(|| c.spline.tessellation());
+    let surfaces: Vec<Option<Tessellation>> = components.iter().map(closed).collect();
+    let surfaces = surfaces.iter().map(|s| {
+        s.as_ref().map(|s| Closed {
+            points: &s.points,
+            faces: &s.faces,
+        })
+    });
+    let found = voids(&surfaces.collect::<Vec<_>>());
+    for (component, void_of) in components.iter_mut().zip(found) {
+        component.void_of = void_of;
     }
 }
 
@@ -291,11 +317,16 @@ impl FittedAsset {
         let components = self.components.iter().map(|c| {
             let FittedComponent {
                 name,
+                void_of,
                 spline,
                 faces,
                 patches,
             } = c;
-            Component::new(name, spline, faces, patches)
+            let void_of = void_of.map(|i| self.components[i].name.clone());
+            Component {
+                void_of,
+                ..Component::new(name, spline, faces, patches)
+            }
         });
         Document {
             format: "affine-atlas-fit".to_owned(),

@@ -31,6 +31,12 @@ impl fmt::Display for FittedAsset {
                 c.normal_deviation.mean_degrees,
                 c.normal_deviation.p95_degrees,
             )?;
+            if let Some(solid) = &c.void_of {
+                writeln!(
+                    f,
+                    "  bounds a cavity of {solid}, whose STEP file has its faces"
+                )?;
+            }
             let step = &c.step;
             writeln!(
                 f,

@@ -5,6 +5,7 @@ use crate::export::fit::{control_mesh, page};
 use crate::export::folder::{Contents, Staging};
 use crate::export::glb::plain;
 use crate::export::pictures::encode_png;
+use crate::export::step::Body;
 use crate::export::usd::ControlMesh;
 use crate::export::{EncodeError, ExportError, gismo, step, usd};
 use crate::spline::Spline;
@@ -19,7 +20,7 @@ const PAGE: &str = "fit.html";
 const FAR: f64 = 4.0;
 
 impl FittedAsset {
-    /// Writes the folder `root/name`: for each component NAME.cage.obj, NAME.usda, NAME.step, NAME.xml, NAME.glb and NAME.zebra.png;
+    /// Writes the folder `root/name`: for each component NAME.cage.obj, NAME.usda, NAME.step (but for cavities, which are in that of their solid), NAME.xml, NAME.glb and NAME.zebra.png;
     /// fit.json and fit.html. It appears complete or not at all.
     ///
     /// # Errors
@@ -27,8 +28,8 @@ impl FittedAsset {
     pub fn write(&self, root: &Path, name: &str) -> Result<(), FitAssetError> {
         let staging = Staging::begin_with(Contents::Fit, root, name)?;
         let mut pictures = Vec::new();
-        for component in &self.components {
-            pictures.push(self.component(component, &staging)?);
+        for index in 0..self.components.len() {
+            pictures.push(self.component(index, &staging)?);
         }
         let document = self.document();
         let html = page::text(name, &document, &pictures);
@@ -41,17 +42,14 @@ impl FittedAsset {
     }
 
     /// The files of a component; gives that of its picture, where there is one.
-    fn component(
-        &self,
-        component: &FittedComponent,
-        staging: &Staging,
-    ) -> Result<Option<String>, ExportError> {
+    fn component(&self, index: usize, staging: &Staging) -> Result<Option<String>, ExportError> {
         let FittedComponent {
             name,
+            void_of,
             spline,
             faces,
             patches,
-        } = component;
+        } = &self.components[index];
         let cage = &spline.cage;
         let file = |extension: &str, text: &dyn Fn(&mut dyn Write) -> io::Result<()>| {
             let mut file = staging.create(&format!("{name}.{extension}"))?;
@@ -72,8 +70,18 @@ impl FittedAsset {
         file("usda", &|mut out| {
             usd::write(std::slice::from_ref(&mesh), unit.metres(), &mut out)
         })?;
-        let shells = [(name.clone(), &faces.shell)];
-        file("step", &|mut out| step::write(&shells, unit, &mut out))?;
+        if void_of.is_none() {
+            let voids = self.components.iter();
+            let voids = voids.filter(|c| c.void_of == Some(index));
+            let body = Body {
+                name,
+                shell: &faces.shell,
+                voids: voids.map(|c| &c.faces.shell).collect(),
+            };
+            file("step", &|mut out| {
+                step::write(std::slice::from_ref(&body), unit, &mut out)
+            })?;
+        }
         file("xml", &|mut out| gismo::write(patches, &mut out))?;
         let triangles = spline.tessellation();
         staging.write(&format!("{name}.glb"), &glb(name, spline, &triangles)?)?;
