@@ -71,6 +71,9 @@ pub struct Summary {
     pub boundary_loops: usize,
     /// Cones.
     pub cones: usize,
+    /// Cells of its grid; none where it has flat patches.
+    #[serde(default)]
+    pub cells: Option<usize>,
     /// max |K − K̄| over the prescribed vertices, radians.
     pub max_curvature_error: f64,
     /// True where that is more than the bound that was asked for, because rounding stopped the flow.
@@ -93,6 +96,7 @@ impl Summary {
             genus: atlas.topology.genus as usize,
             boundary_loops: atlas.topology.boundary_loops,
             cones: atlas.prescription.cones.len(),
+            cells: atlas.grid.as_ref().map(|grid| grid.cells()),
             max_curvature_error: atlas.metric.max_curvature_error,
             limited_by_float64: atlas.limited_by_float64(),
             area_distortion: atlas.quality.area_distortion,
@@ -139,7 +143,7 @@ pub struct AssetOutcome {
     pub files: Vec<String>,
     /// BLAKE3 hash of the input, hexadecimal; absent where it could not be read.
     pub input_hash: Option<String>,
-    /// What the reader left out.
+    /// What was said of it: what the reader left out, what was asked for and could not be had, much distortion.
     pub notes: Vec<String>,
     /// Most memory that the asset's process held, bytes; absent where the system does not tell, or nothing was computed.
     #[serde(default)]

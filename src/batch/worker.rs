@@ -324,6 +324,7 @@ mod tests {
             genus: 0,
             boundary_loops: 0,
             cones: 4,
+            cells: Some(6),
             max_curvature_error: 0.1 + 0.2,
             limited_by_float64: true,
             area_distortion: 1e-300,

@@ -9,6 +9,9 @@ use affine_atlas::batch::{Batch, Task};
 use affine_atlas::outcome::{AssetOutcome, AssetState, FailureKind};
 use std::path::{Path, PathBuf};
 
+/// The run as test cases, in the output folder.
+pub const JUNIT: &str = "junit.xml";
+
 /// What makes this program a worker.
 const WORKER: &[&str] = &["worker"];
 
@@ -82,7 +85,7 @@ pub fn write_records<'t>(
     tasks: impl Iterator<Item = &'t Task>,
     files: &[PathBuf],
 ) -> Result<(), Problem> {
-    let junit_xml = output.join("junit.xml");
+    let junit_xml = output.join(JUNIT);
     check::write_whole(&junit_xml, junit(outcomes).as_bytes()).map_err(
         |problem| match problem {
             Problem::NotWritten { path, reason } => Problem::NotRecorded { path, reason },

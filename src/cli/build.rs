@@ -1,7 +1,7 @@
 //! `affine-atlas build`.
 
 use super::arguments::{Build, Global, LogFormat};
-use super::batch::{batch, exit_code, show, write_records};
+use super::batch::{JUNIT, batch, exit_code, show, write_records};
 use super::inputs::select;
 use super::problem::Problem;
 use super::profile::Profile;
@@ -13,7 +13,15 @@ use affine_atlas::batch::cache::Verdict;
 
 /// Builds every asset, shows what became of each, and gives the exit code.
 pub fn run(build: &Build, global: &Global, work: &Work) -> Result<u8, Problem> {
-    let selected = select(&build.inputs, build.out.as_deref())?;
+    let selected = select(&build.inputs, build.out.as_deref());
+    if let Err(Problem::NothingFound { output, .. }) = &selected
+        && !build.dry_run
+        && output.join(JUNIT).exists()
+    {
+        // What a build server reads shall not be that of an earlier run.
+        write_records(output, &[], None, std::iter::empty(), &[])?;
+    }
+    let selected = selected?;
     selected.keep_inputs(|asset| selected.folder(asset))?;
     let tasks = selected.tasks();
     let run = &selected.config.run;

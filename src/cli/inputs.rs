@@ -65,6 +65,7 @@ pub fn select(inputs: &Inputs, out: Option<&Path>) -> Result<Selection, Problem>
     if inputs.files.is_empty() {
         return Err(Problem::NothingFound {
             notes: inputs.notes,
+            output,
         });
     }
     for note in &inputs.notes {

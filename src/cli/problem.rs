@@ -36,7 +36,7 @@ pub enum Problem {
     #[error("no mesh is named: `input.paths` is empty")]
     NoInputs,
     #[error("no mesh was found: {}", notes.join("; "))]
-    NothingFound { notes: Vec<String> },
+    NothingFound { notes: Vec<String>, output: PathBuf },
     #[error(
         "the output folder {} of this run would replace the folder of its input {}",
         folder.display(), input.display()

@@ -6,18 +6,19 @@ use console::{measure_text_width, style, truncate_str};
 use std::path::Path;
 
 /// Columns, and the order in which they are left out where the terminal is narrow.
-const COLUMNS: [&str; 9] = [
+const COLUMNS: [&str; 10] = [
     "mesh",
     "state",
     "vertices",
     "faces",
     "genus",
     "cones",
+    "cells",
     "max error",
     "area distortion",
     "seconds",
 ];
-const LEAVE_OUT: [usize; 6] = [8, 4, 5, 7, 2, 3];
+const LEAVE_OUT: [usize; 7] = [9, 4, 5, 8, 2, 3, 6];
 /// Columns that hold words; the others hold figures and are set flush right.
 const WORDS: usize = 2;
 const FOLDER: &str = "folder";
@@ -45,8 +46,13 @@ pub fn results(outcomes: &[AssetOutcome], width: Option<usize>) -> String {
         let counts: Vec<String> = counts
             .map(|(count, state)| format!("{count} {state}"))
             .collect();
+        let warned = outcomes.iter().filter(|o| !o.notes.is_empty()).count();
+        let warned = match warned {
+            0 => String::new(),
+            warned => format!("; {warned} with warnings, which manifest.jsonl and index.html keep"),
+        };
         text.push_str(&format!(
-            "{} meshes: {}\n",
+            "{} meshes: {}{warned}\n",
             outcomes.len(),
             counts.join(", ")
         ));
@@ -55,7 +61,7 @@ pub fn results(outcomes: &[AssetOutcome], width: Option<usize>) -> String {
 }
 
 struct Row {
-    cells: [String; 9],
+    cells: [String; 10],
     folder: String,
     state: &'static str,
 }
@@ -220,6 +226,10 @@ fn together(components: &[ComponentOutcome]) -> Option<Summary> {
         genus: a.genus + b.genus,
         boundary_loops: a.boundary_loops + b.boundary_loops,
         cones: a.cones + b.cones,
+        cells: match (a.cells, b.cells) {
+            (Some(a), Some(b)) => Some(a + b),
+            (a, b) => a.or(b),
+        },
         max_curvature_error: a.max_curvature_error.max(b.max_curvature_error),
         limited_by_float64: a.limited_by_float64 || b.limited_by_float64,
         area_distortion: a.area_distortion.max(b.area_distortion),
@@ -248,6 +258,7 @@ fn row(
             figure(&|f| f.faces.to_string()),
             figure(&|f| f.genus.to_string()),
             figure(&|f| f.cones.to_string()),
+            figure(&|f| f.cells.map_or("–".to_owned(), |cells| cells.to_string())),
             figure(&|f| match f.limited_by_float64 {
                 true => format!("{:.1e} (float64)", f.max_curvature_error),
                 false => format!("{:.1e}", f.max_curvature_error),
@@ -299,6 +310,7 @@ pub fn log(outcome: &AssetOutcome) {
                 genus = figures.genus,
                 boundary_loops = figures.boundary_loops,
                 cones = figures.cones,
+                cells = figures.cells,
                 max_curvature_error = figures.max_curvature_error,
                 limited_by_float64 = figures.limited_by_float64,
                 area_distortion = figures.area_distortion,
@@ -341,6 +353,7 @@ mod tests {
             genus: 0,
             boundary_loops: 0,
             cones: 8,
+            cells: Some(2004),
             max_curvature_error: 3.14e-13,
             limited_by_float64: false,
             area_distortion: 1.23456,
@@ -393,12 +406,12 @@ mod tests {
     #[test]
     fn wide_table() {
         insta::assert_snapshot!(table(&sample(), None), @r"
-        mesh           state         vertices  faces  genus  cones  max error  area distortion  seconds  folder
-        spot           built             2930   5856      0      8    3.1e-13           1.2346      0.9  out/spot
-        truck          1 of 2 built                                                                12.0
-          component 0  built             2930   5856      0      8    3.1e-13           1.2346           out/spot
+        mesh           state         vertices  faces  genus  cones  cells  max error  area distortion  seconds  folder
+        spot           built             2930   5856      0      8   2004    3.1e-13           1.2346      0.9  out/spot
+        truck          1 of 2 built                                                                       12.0
+          component 0  built             2930   5856      0      8   2004    3.1e-13           1.2346           out/spot
           component 1  failed
-        möbius         failed                                                                       0.1
+        möbius         failed                                                                              0.1
         ");
     }
 
@@ -410,10 +423,10 @@ mod tests {
             }
         }
         insta::assert_snapshot!(table(&sample(), Some(60)), @r"
-        mesh           state         vertices  faces  max error
-        spot           built             2930   5856    3.1e-13
+        mesh           state         faces  cells  max error
+        spot           built          5856   2004    3.1e-13
         truck          1 of 2 built
-          component 0  built             2930   5856    3.1e-13
+          component 0  built          5856   2004    3.1e-13
           component 1  failed
         möbius         failed
         ");
@@ -430,17 +443,18 @@ mod tests {
             ));
         }
         outcomes[2].kept = true;
+        outcomes[3].notes.push("a3 has flat patches".to_owned());
         insta::assert_snapshot!(results(&outcomes, Some(60)), @r"
-        mesh           state         vertices  faces  max error
+        mesh           state         faces  cells  max error
         truck          1 of 2 built
-          component 0  built             2930   5856    3.1e-13
+          component 0  built          5856   2004    3.1e-13
           component 1  failed
         möbius         failed
-        53 meshes: 1 built, 50 cached, 2 failed
+        53 meshes: 1 built, 50 cached, 2 failed; 1 with warnings, which manifest.jsonl and index.html keep
         ");
         assert!(failures(&outcomes).ends_with("add a cone; the older result was kept\n"));
         assert!(!results(&outcomes[..1], None).contains("meshes:"));
-        assert_eq!(results(&outcomes[3..], None), "50 meshes: 50 cached\n");
+        assert_eq!(results(&outcomes[4..], None), "49 meshes: 49 cached\n");
     }
 
     #[test]

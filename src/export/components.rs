@@ -77,6 +77,9 @@ pub struct Figures {
     pub patches: usize,
     /// Cells of its grid, where it has one.
     pub cells: Option<usize>,
+    /// Its irregular points, likewise.
+    #[serde(default)]
+    pub irregular_points: Option<usize>,
     /// max |K − K̄|, radians.
     pub max_curvature_error: f64,
     /// (9), both areas normalised to 1.
@@ -127,6 +130,7 @@ impl Figures {
             cones: atlas.prescription.cones.len(),
             patches: atlas.patches.patches.len(),
             cells: atlas.grid.as_ref().map(|grid| grid.cells()),
+            irregular_points: atlas.grid.as_ref().map(|grid| grid.irregular().len()),
             max_curvature_error: atlas.metric.max_curvature_error,
             area_distortion: atlas.quality.area_distortion,
             log_scale_std: atlas.quality.log_scale.std,

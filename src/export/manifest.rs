@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::Path;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Name of the file in the output root.
 pub const FILE_NAME: &str = names::MANIFEST;
@@ -43,6 +44,15 @@ pub struct Record {
     pub kind: Option<FailureKind>,
     /// One sentence that says what to change.
     pub error: Option<String>,
+    /// What was said of it when it was built: what was left out of the input, what could not be had, much distortion; the first of many.
+    #[serde(default)]
+    pub warnings: Vec<String>,
+    /// How many such sentences there were.
+    #[serde(default)]
+    pub warning_count: usize,
+    /// When this line was written, seconds since 1970; later for every run that has to do with the asset.
+    #[serde(default)]
+    pub checked: u64,
     /// Wall time, seconds.
     pub seconds: f64,
     /// Peak memory of the asset's process, bytes; absent where the system does not tell, or nothing was computed.
@@ -90,6 +100,7 @@ impl Record {
     pub fn of(outcome: &AssetOutcome, config_hash: &str) -> Record {
         let failure = outcome.failures().next().map(|(_, failure)| failure);
         let components = outcome.components.iter().map(ComponentRecord::of);
+        let now = SystemTime::now().duration_since(UNIX_EPOCH);
         Record {
             id: outcome.id.clone(),
             input_hash: outcome.input_hash.clone(),
@@ -102,6 +113,9 @@ impl Record {
             },
             kind: failure.map(|f| f.kind),
             error: failure.map(|f| f.message.clone()),
+            warnings: outcome.notes.iter().take(MOST_WARNINGS).cloned().collect(),
+            warning_count: outcome.notes.len(),
+            checked: now.map_or(0, |since| since.as_secs()),
             seconds: outcome.seconds,
             peak_memory: outcome.peak_memory,
             host: outcome.host.clone(),
@@ -115,6 +129,9 @@ impl Record {
         }
     }
 }
+
+/// Warnings that a record holds: an asset of thousands of components may have as many.
+const MOST_WARNINGS: usize = 40;
 
 /// All records of an output root.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -278,6 +295,9 @@ mod tests {
             state,
             kind: (state == State::Failed).then_some(FailureKind::NotConverged),
             error: (state == State::Failed).then(|| "raise the limit".into()),
+            warnings: vec!["has flat patches".into()],
+            warning_count: 1,
+            checked: 1_795_996_800,
             seconds: 0.1 + 0.2,
             peak_memory: Some(1 << 30),
             host: Some("night-1".into()),

@@ -4,25 +4,19 @@
 //! cycles, since a cycle may ask for more than any metric has and a forest never does; the same order for the same mesh. *Not guaranteed:* that all of them can be met.
 
 mod beside;
+mod chains;
 pub mod file;
 mod noise;
+mod solid;
 
-use self::beside::Beside;
+use self::chains::feature;
+use self::solid::{Kind, Surface};
+pub use self::solid::{LEAST_EDGES, LEAST_LENGTH, LONG};
 use crate::geometry::disjoint_sets::UnionFind;
-use crate::geometry::ids::{EdgeId, EdgeVec, HalfedgeId, NONE, VertexId, VertexVec};
+use crate::geometry::ids::{EdgeId, EdgeVec, HalfedgeId, VertexId};
 use crate::geometry::mesh::{Mesh, cross, dot, sub, triangle_area};
 use std::cmp::Ordering;
 use std::path::PathBuf;
-
-/// Fewest edges of a chain that counts where nobody named them: shorter ones are mostly noise, …
-pub const LEAST_EDGES: usize = 5;
-/// … unless they are as long as this, in square roots of the surface's area, ridges or valleys throughout, have room on both sides, and a flat side or long edges: edges of a solid.
-pub const LONG: f64 = 0.05;
-/// Least length of a chain of many edges, in square roots of the surface's area: about a side of the cells when there are 2,000. What is shorter has no place in a grid, however
-/// many edges it has.
-pub const LEAST_LENGTH: f64 = 0.02;
-/// Length of edges on average, in square roots of the surface's area, from which a mesh is coarse and its edges are more than noise.
-const COARSE: f64 = 0.1;
 
 /// Sine of the angle at a corner below which a face has no direction.
 const FLAT: f64 = 1e-6;
@@ -107,60 +101,31 @@ pub struct Features {
 pub fn features(mesh: &Mesh, params: &FeatureParams, named: &[EdgeId]) -> Features {
     let c = &mesh.connectivity;
     let bend: EdgeVec<f64> = c.edges().map(|e| bend(mesh, e)).collect();
-    let least = params.angle.to_radians();
-    let sharp = wanted(mesh, params, named);
     let mut is_named = EdgeVec::filled(false, c.edge_count());
     named.iter().for_each(|&e| is_named[e] = true);
     let area: f64 = c
         .faces()
         .map(|f| triangle_area(mesh.face_positions(f)))
         .sum();
-    // Which edges are of a ridge, of those that are sharp; others are between materials.
-    let kinds = |f: &Feature| -> Vec<bool> {
-        let sharp = f.edges.iter().filter(|&&e| bend[e] >= least);
-        sharp.map(|&e| is_ridge(mesh, e)).collect()
-    };
-    let is_long =
-        |f: &Feature| given_edges(mesh, f) >= LEAST_EDGES && f.length / area.sqrt() >= LEAST_LENGTH;
-    let all = chains(mesh, &sharp).into_iter();
-    let all: Vec<Feature> = all.map(|chain| feature(mesh, &bend, chain)).collect();
-    let is_material = |f: &Feature| f.edges.iter().any(|&e| bend[e] < least);
-    let tested = all.iter().filter(|f| is_long(f) && !is_material(f));
-    let most = noise::most(tested.map(|f| noise::chance(&kinds(f))).collect());
-    let is_no_chance = |f: &Feature| is_material(f) || noise::chance(&kinds(f)) <= most;
-    let beside = Beside {
+    let surface = Surface {
         mesh,
-        sharp: &sharp,
         bend: &bend,
-        least,
+        least: params.angle.to_radians(),
+        is_named: &is_named,
+        side: area.sqrt(),
     };
-    // Edges of a solid, as it seems, …
-    let is_meant = |f: &Feature| {
-        let kinds = kinds(f);
-        let are_alike = kinds.iter().all(|&k| k == kinds[0]);
-        let is_coarse = f.length / area.sqrt() >= COARSE * given_edges(mesh, f) as f64;
-        let stands_out = || are_alike && (is_coarse || beside.has_flat_side(f));
-        // Long single edges may be sides of a hole of eight.
-        let may_be_step = given_edges(mesh, f) > 1 || f.length / area.sqrt() < LONG;
-        let is_step = || may_be_step && beside.is_step(f);
-        let is_one = (is_long(f) && is_no_chance(f) || stands_out()) && !is_step();
-        is_material(f) || is_one
+    let lines = wanted(mesh, params, named);
+    let all = chains::chains(mesh, &lines, |_| false).into_iter();
+    let all: Vec<Feature> = all.map(|chain| feature(mesh, &bend, chain)).collect();
+    let kinds = surface.kinds(&all, &lines);
+    let all: Vec<_> = all.into_iter().zip(kinds).collect();
+    let total = |is_one: &dyn Fn(Kind) -> bool| -> f64 {
+        let some = all.iter().filter(|(_, kind)| is_one(*kind));
+        let lengths = some.map(|(f, _)| f.length);
+        lengths.filter(|l| l / surface.side >= LEAST_LENGTH).sum()
     };
-    // … and those that have a place in a grid.
-    let counts = |f: &Feature| {
-        let has_place = || f.length / area.sqrt() >= LONG && beside.has_room(f);
-        is_long(f) && is_no_chance(f) || has_place()
-    };
-    let total = |chains: &[Feature]| -> f64 {
-        let lengths = chains.iter().map(|f| f.length);
-        lengths.filter(|l| l / area.sqrt() >= LEAST_LENGTH).sum()
-    };
-    let whole = total(&all);
-    let is_named = |f: &Feature| f.edges.iter().any(|&e| is_named[e]);
-    let meant = all.into_iter().filter(|f| is_named(f) || is_meant(f));
-    let (mut found, lost): (Vec<Feature>, Vec<Feature>) =
-        meant.partition(|f| is_named(f) || counts(f));
-    let lost = total(&lost);
+    let (lost, whole) = (total(&|kind| kind == Kind::Crowded), total(&|_| true));
+    let mut found = undivided(mesh, &bend, &lines, &all);
     found.sort_by(|a, b| {
         let order = b.importance().partial_cmp(&a.importance());
         order.unwrap_or(Ordering::Equal)
@@ -183,10 +148,29 @@ pub fn features(mesh: &Mesh, params: &FeatureParams, named: &[EdgeId]) -> Featur
     }
 }
 
-/// Edges of a chain that the input has: not parts of them.
-fn given_edges(mesh: &Mesh, f: &Feature) -> usize {
-    let is_given = |v: &&VertexId| mesh.source_vertex[**v] != NONE;
-    f.vertices[1..].iter().filter(is_given).count()
+/// The chains that shall become lines, of all. Where only edges of noise meet a line, it goes on, unless it turns by more than 60° there.
+fn undivided(
+    mesh: &Mesh,
+    bend: &EdgeVec<f64>,
+    sharp: &EdgeVec<bool>,
+    all: &[(Feature, Kind)],
+) -> Vec<Feature> {
+    let of = |is_one: &dyn Fn(Kind) -> bool| {
+        let mut edges = EdgeVec::filled(false, mesh.connectivity.edge_count());
+        for (f, _) in all.iter().filter(|(_, kind)| is_one(*kind)) {
+            f.edges.iter().for_each(|&e| edges[e] = true);
+        }
+        edges
+    };
+    let (lines, meant) = (of(&|k| k == Kind::Line), of(&|k| k != Kind::Noise));
+    let degrees = [sharp, &meant, &lines].map(|edges| chains::degrees(mesh, edges));
+    let [of_sharp, of_meant, of_lines] = &degrees;
+    let is_joint = |v: VertexId| {
+        let is_met = of_sharp[v] != of_lines[v];
+        is_met && (of_meant[v] != of_lines[v] || !chains::goes_on(mesh, &lines, v))
+    };
+    let chains = chains::chains(mesh, &lines, is_joint).into_iter();
+    chains.map(|chain| feature(mesh, bend, chain)).collect()
 }
 
 /// The angle of a face at the tail of a halfedge, radians; 0 where it has none.
@@ -232,70 +216,6 @@ fn is_ridge(mesh: &Mesh, e: EdgeId) -> bool {
     let [p, q, r] = mesh.face_positions(c.face(h));
     let beyond = c.twin(h).map_or(p, |t| mesh.positions[c.apex(t)]);
     dot(cross(sub(q, p), sub(r, p)), sub(beyond, p)) < 0.0
-}
-
-/// Maximal chains of sharp edges between vertices where other than two of them meet, or which lie on the boundary; then closed ones.
-fn chains(mesh: &Mesh, sharp: &EdgeVec<bool>) -> Vec<Vec<VertexId>> {
-    let c = &mesh.connectivity;
-    let mut degree = VertexVec::filled(0, c.vertex_count());
-    for (e, _) in sharp.enumerate().filter(|(_, s)| **s) {
-        c.edge_vertices(e).into_iter().for_each(|v| degree[v] += 1);
-    }
-    let mut is_walked = EdgeVec::filled(false, c.edge_count());
-    let neighbours = |v: VertexId| {
-        let ways = c.outgoing(v).flat_map(|h| [h, c.prev(h)]);
-        ways.map(|h| c.edge(h)).filter(|&e| sharp[e])
-    };
-    let other = |e: EdgeId, v: VertexId| {
-        let [a, b] = c.edge_vertices(e);
-        if a == v { b } else { a }
-    };
-    let is_end = |v: VertexId| degree[v] != 2 || c.is_boundary_vertex(v);
-    let mut chains = Vec::new();
-    let mut walk = |start: VertexId, is_walked: &mut EdgeVec<bool>| {
-        while let Some(first) = neighbours(start).find(|&e| !is_walked[e]) {
-            let mut chain = vec![start];
-            let (mut v, mut e) = (start, first);
-            loop {
-                is_walked[e] = true;
-                v = other(e, v);
-                chain.push(v);
-                if v == start || is_end(v) {
-                    break;
-                }
-                match neighbours(v).find(|&e| !is_walked[e]) {
-                    Some(next) => e = next,
-                    None => break,
-                }
-            }
-            chains.push(chain);
-        }
-    };
-    for v in c.vertices().filter(|&v| degree[v] > 0 && is_end(v)) {
-        walk(v, &mut is_walked);
-    }
-    for v in c.vertices().filter(|&v| degree[v] > 0) {
-        walk(v, &mut is_walked);
-    }
-    chains
-}
-
-fn feature(mesh: &Mesh, bend: &EdgeVec<f64>, vertices: Vec<VertexId>) -> Feature {
-    let c = &mesh.connectivity;
-    let between = |pair: &[VertexId]| {
-        let ways = c.outgoing(pair[0]).flat_map(|h| [h, c.prev(h)]);
-        let mut edges = ways.map(|h| c.edge(h));
-        edges.find(|&e| c.edge_vertices(e).contains(&pair[1]))
-    };
-    let edges: Vec<EdgeId> = vertices.windows(2).filter_map(between).collect();
-    let length: f64 = edges.iter().map(|&e| mesh.edge_length(e)).sum();
-    let turned: f64 = edges.iter().map(|&e| mesh.edge_length(e) * bend[e]).sum();
-    Feature {
-        vertices,
-        edges,
-        length,
-        angle: if length > 0.0 { turned / length } else { 0.0 },
-    }
 }
 
 #[cfg(test)]

@@ -161,6 +161,7 @@ fn run_stages(
     )?;
     if let Some(note) = warnings::without_folders(given, parts.len(), config) {
         tracing::warn!(asset = id, "{note}");
+        outcome.notes.push(note);
     }
     assembly.finish(publication, config, &outcome.notes)?;
     if untold > 0 {

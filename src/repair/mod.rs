@@ -175,7 +175,7 @@ pub enum RepairError {
     },
     /// The surface falls apart.
     #[error(
-        "the repaired surface falls into {components} components, more than {}; repair found: {summary}; weld the mesh or take out inner walls, or set repair.max_components = {}",
+        "the repaired surface falls into {components} components, more than {}; repair found: {summary}; weld the mesh where they belong together (repair.weld_tolerance), take out inner walls, or, where they are loose parts such as leaves, set repair.max_components = {}",
         match fragments {
             Some(why) => format!("a twentieth of repair.max_components = {most} ({why})"),
             None => format!("repair.max_components = {most}"),
@@ -281,7 +281,12 @@ pub fn repair(soup: &Soup, params: &RepairParams) -> Result<Repaired, RepairErro
     let (mut changes, stands_for, draft) = loop {
         let mut changes = Vec::new();
         let stands_for = weld::weld(&positions, &soup.faces, params, &all_met, &mut changes);
-        let (draft, met) = clean::clean(&positions, &soup.faces, &stands_for, &mut changes);
+        let welded = changes.len();
+        let (draft, mut met) = clean::clean(&positions, &soup.faces, &stands_for, &mut changes);
+        if changes.len() > welded {
+            // Edges that had more than needles beside them may have no more now.
+            met.extend(weld::needles(&positions, &draft));
+        }
         // Each pair is a vertex fewer.
         if met.is_empty() {
             break (changes, stands_for, draft);

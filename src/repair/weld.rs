@@ -10,6 +10,7 @@
 
 use crate::geometry::mesh::{bounding_box, distance};
 use crate::repair::RepairParams;
+use crate::repair::clean::DraftFace;
 use crate::repair::log::Change;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
@@ -186,6 +187,18 @@ fn join_needles(positions: &[[f64; 3]], faces: &[[u32; 3]], stands_for: &mut [u3
             join(stands_for, a, b);
         }
     }
+}
+
+/// Pairs of vertices of faces that are one point in the same way.
+pub fn needles(positions: &[[f64; 3]], faces: &[DraftFace]) -> Vec<[u32; 2]> {
+    let faces: Vec<[u32; 3]> = faces.iter().map(|face| face.vertices).collect();
+    let mut stands_for: Vec<u32> = (0..positions.len() as u32).collect();
+    join_needles(positions, &faces, &mut stands_for);
+    let onto: Vec<u32> = (0..positions.len() as u32)
+        .map(|v| root(&mut stands_for, v))
+        .collect();
+    let joined = (0..).zip(onto).filter(|(v, onto)| v != onto);
+    joined.map(|(v, onto)| [onto, v]).collect()
 }
 
 /// The vertex at the end of the chain, which is halved on the way.

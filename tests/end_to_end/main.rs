@@ -26,6 +26,7 @@ mod reading;
 #[path = "../real_models/mod.rs"]
 mod real_models;
 mod rebuild;
+mod records;
 mod refusals;
 mod replacing;
 mod rough;

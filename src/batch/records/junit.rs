@@ -2,7 +2,7 @@
 //!
 //! *Enters:* outcomes. *Leaves:* the text of `junit.xml`. There is no standard; the elements and attributes are those that
 //! Jenkins and GitLab document: `testsuite` with counts, `testcase` with `failure` (the mesh, the settings or their limits), `error` (this
-//! program or the disk) or `skipped` (stopped before it was built). An asset that is cached passes, and says so in its output.
+//! program or the disk) or `skipped` (stopped before it was built). An asset that is cached passes, and says so in its output, where warnings stand, too.
 
 use crate::outcome::{AssetOutcome, AssetState, FailureKind};
 use std::fmt::Write;
@@ -52,10 +52,14 @@ pub fn junit(outcomes: &[AssetOutcome]) -> String {
                 skipped += 1;
                 cases.push_str("<skipped message=\"stopped\"/>");
             }
-            None => {
-                let _ = write!(cases, "<system-out>{}</system-out>", outcome.state_name());
-            }
+            None => {}
         }
+        let warnings = outcome
+            .notes
+            .iter()
+            .map(|note| format!("\nwarning: {note}"));
+        let said = format!("{}{}", outcome.state_name(), warnings.collect::<String>());
+        let _ = write!(cases, "<system-out>{}</system-out>", escaped(&said));
         cases.push_str("</testcase>\n");
     }
     let counts = format!(
@@ -97,6 +101,8 @@ mod tests {
             kind,
             message: message.into(),
         };
+        let mut old = AssetOutcome::whole("old", AssetState::Cached, 0.0);
+        old.notes.push("old.obj has <2> & \"more\"".into());
         let mut half = AssetOutcome::whole("half", AssetState::Built, 2.5);
         half.components.push(ComponentOutcome {
             index: 3,
@@ -107,7 +113,7 @@ mod tests {
         });
         let outcomes = [
             AssetOutcome::whole("good", AssetState::Built, 1.0),
-            AssetOutcome::whole("old", AssetState::Cached, 0.0),
+            old,
             half,
             AssetOutcome::failed("disk", failure(FailureKind::Output, "full"), 0.5),
             AssetOutcome::whole("later", AssetState::Cancelled, 0.0),
@@ -132,6 +138,8 @@ mod tests {
             .filter(|n| n.has_tag_name("testcase"))
             .collect();
         assert_eq!(cases.len(), 5);
+        let output = cases[1].first_element_child().and_then(|n| n.text());
+        assert_eq!(output, Some("cached\nwarning: old.obj has <2> & \"more\""));
         assert_eq!(cases[2].attribute("name"), Some("half"));
         let found = cases[2].first_element_child().unwrap();
         assert_eq!(

@@ -21,6 +21,10 @@ pub(super) struct Figures {
     pub cones: u64,
     /// Patches.
     pub patches: u64,
+    /// Cells of grids; none where there are flat patches only.
+    pub cells: Option<u64>,
+    /// Irregular points of grids, likewise.
+    pub irregular: Option<u64>,
     /// (9).
     pub area_distortion: f64,
     /// Standard deviation of the log scale.
@@ -36,7 +40,14 @@ struct Document {
     topology: Topology,
     cones: Vec<IgnoredAny>,
     patches: Vec<IgnoredAny>,
+    grid: Option<Grid>,
     quality: Quality,
+}
+
+#[derive(Deserialize)]
+struct Grid {
+    cells: u64,
+    irregular: Vec<IgnoredAny>,
 }
 
 #[derive(Deserialize)]
@@ -74,6 +85,11 @@ impl Figures {
             boundary_loops: document.topology.boundary_loops,
             cones: document.cones.len() as u64,
             patches: document.patches.len() as u64,
+            cells: document.grid.as_ref().map(|grid| grid.cells),
+            irregular: document
+                .grid
+                .as_ref()
+                .map(|grid| grid.irregular.len() as u64),
             area_distortion: quality.area_distortion,
             log_scale_std: quality.log_scale.std,
             angle_error_mean: quality.angle_error.mean,
@@ -89,6 +105,8 @@ impl Figures {
             boundary_loops: figures.boundary_loops as u64,
             cones: figures.cones as u64,
             patches: figures.patches as u64,
+            cells: figures.cells.map(|cells| cells as u64),
+            irregular: figures.irregular_points.map(|points| points as u64),
             area_distortion: figures.area_distortion,
             log_scale_std: figures.log_scale_std,
             angle_error_mean: figures.angle_error_mean,
@@ -97,12 +115,18 @@ impl Figures {
     }
 
     fn with(self, other: &Self) -> Self {
+        let sum = |a: Option<u64>, b: Option<u64>| match (a, b) {
+            (Some(a), Some(b)) => Some(a + b),
+            (a, b) => a.or(b),
+        };
         Self {
             faces: self.faces + other.faces,
             genus: self.genus + other.genus,
             boundary_loops: self.boundary_loops + other.boundary_loops,
             cones: self.cones + other.cones,
             patches: self.patches + other.patches,
+            cells: sum(self.cells, other.cells),
+            irregular: sum(self.irregular, other.irregular),
             area_distortion: self.area_distortion.max(other.area_distortion),
             log_scale_std: self.log_scale_std.max(other.log_scale_std),
             angle_error_mean: self.angle_error_mean.max(other.angle_error_mean),

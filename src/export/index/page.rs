@@ -14,6 +14,8 @@ const SCRIPT: &str = include_str!("index.js");
 const LEADING: usize = 10;
 /// Links to reports that stand beside an asset; one of many components has more.
 const REPORTS: usize = 3;
+/// Warnings of an asset that are shown.
+const WARNINGS: usize = 4;
 
 fn name(state: State) -> &'static str {
     match state {
@@ -40,6 +42,7 @@ pub(super) fn page(assets: &[Asset<'_>], changes: &Changes) -> String {
     counts(&mut body, assets);
     compared(&mut body, assets, changes);
     failures(&mut body, assets);
+    warnings(&mut body, assets);
     leading(&mut body, assets);
     all(&mut body, assets, changes);
     let version = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
@@ -289,6 +292,35 @@ fn failures(body: &mut String, assets: &[Asset<'_>]) {
     body.push_str("</ul></details>\n");
 }
 
+/// What was said of assets when they were built.
+fn warnings(body: &mut String, assets: &[Asset<'_>]) {
+    let warned = || assets.iter().filter(|a| !a.record.warnings.is_empty());
+    let count = warned().count();
+    if count == 0 {
+        return;
+    }
+    let _ = write!(
+        body,
+        "<h2>Warnings</h2>\n<details><summary><b>{count}</b> with warnings</summary><ul id=\"warnings\">\n"
+    );
+    for asset in warned() {
+        let all = asset.record.warnings.iter();
+        let shown: Vec<String> = all.take(WARNINGS).map(|text| escape(text)).collect();
+        let more = asset.record.warning_count.saturating_sub(shown.len());
+        let more = match more {
+            0 => String::new(),
+            more => format!("<br><span class=\"soft\">{more} more</span>"),
+        };
+        let _ = writeln!(
+            body,
+            "<li>{}: {}{more}</li>",
+            linked(asset),
+            shown.join("<br>")
+        );
+    }
+    body.push_str("</ul></details>\n");
+}
+
 /// The slowest, and those with the worst distortion.
 fn leading(body: &mut String, assets: &[Asset<'_>]) {
     let mut slowest: Vec<(&Asset<'_>, f64)> = (assets.iter())
@@ -315,7 +347,7 @@ fn leading(body: &mut String, assets: &[Asset<'_>]) {
 }
 
 /// Columns of the table: head, whether it holds numbers, and what these are.
-const HEADS: [(&str, bool, &str); 15] = [
+const HEADS: [(&str, bool, &str); 18] = [
     ("asset", false, "links to its folder and its reports"),
     ("state", false, "what became of it in this run"),
     ("change", false, "against the runs before"),
@@ -326,6 +358,12 @@ const HEADS: [(&str, bool, &str); 15] = [
     ("loops", true, "boundary loops of all components"),
     ("cones", true, "vertices of prescribed curvature"),
     ("patches", true, "geometry images"),
+    (
+        "cells",
+        true,
+        "of the grids of all components; none: flat patches",
+    ),
+    ("irregular", true, "irregular points of these grids"),
     (
         "area distortion",
         true,
@@ -346,12 +384,13 @@ const HEADS: [(&str, bool, &str); 15] = [
         true,
         "PSNR of the surface rebuilt from the images, the worst component",
     ),
+    ("warnings", true, "what was said of it when it was built"),
     ("kind", false, "of a failure"),
 ];
 
 fn all(body: &mut String, assets: &[Asset<'_>], changes: &Changes) {
     body.push_str(
-        "<h2 id=\"all\">All assets</h2>\n<form id=\"filter\" role=\"search\"><label>Find <input type=\"search\" name=\"text\" autocomplete=\"off\" placeholder=\"id, kind, words of a failure\"></label> <output id=\"shown\" aria-live=\"polite\"></output></form>\n\
+        "<h2 id=\"all\">All assets</h2>\n<form id=\"filter\" role=\"search\"><label>Find <input type=\"search\" name=\"text\" autocomplete=\"off\" placeholder=\"id, kind, words of a failure or warning\"></label> <output id=\"shown\" aria-live=\"polite\"></output></form>\n\
          <div class=\"scroll tall\" tabindex=\"0\" role=\"region\" aria-label=\"All assets\"><table id=\"assets\" data-sortable><thead><tr>",
     );
     for (head, is_number, meaning) in HEADS {
@@ -371,11 +410,12 @@ fn all(body: &mut String, assets: &[Asset<'_>], changes: &Changes) {
 fn row(body: &mut String, asset: &Asset<'_>, change: Option<Change>) {
     let record = asset.record;
     let state = name(record.state);
-    let error = record.error.as_deref().unwrap_or_default();
+    let said = record.error.iter().chain(&record.warnings);
+    let said: Vec<&str> = said.map(String::as_str).collect();
     let _ = write!(
         body,
         "<tr data-state=\"{state}\" data-words=\"{}\"><td data-value=\"{}\">{}<span>{}</span></td><td class=\"{state}\" data-value=\"{state}\">{} {state}</td><td>{}</td>",
-        escape(error),
+        escape(&said.join(" ")),
         escape(&record.id),
         thumbnail(asset),
         linked(asset),
@@ -402,10 +442,13 @@ fn row(body: &mut String, asset: &Asset<'_>, change: Option<Change>) {
     number(of.map(|f| f.boundary_loops as f64), &count);
     number(of.map(|f| f.cones as f64), &count);
     number(of.map(|f| f.patches as f64), &count);
+    number(of.and_then(|f| f.cells).map(|n| n as f64), &count);
+    number(of.and_then(|f| f.irregular).map(|n| n as f64), &count);
     number(of.map(|f| f.area_distortion), &three_digits);
     number(of.map(|f| f.log_scale_std), &three_digits);
     number(of.map(|f| f.angle_error_mean), &angle);
     number(of.and_then(|f| f.image_psnr_db), &|x| format!("{x:.1} dB"));
+    number(Some(record.warning_count as f64), &count);
     let kind = record.kind.map_or("", |kind| kind.name());
     let _ = writeln!(body, "<td>{kind}</td></tr>");
 }

@@ -17,7 +17,9 @@ use crate::flow::prescription::FromField;
 use crate::flow::signature::FULL_TURN;
 use crate::flow::surface_delaunay::SurfaceDelaunay;
 use crate::geometry::curvature;
-use crate::geometry::ids::{EdgeId, EdgeVec, FaceVec, HalfedgeId, VertexId, VertexVec};
+use crate::geometry::ids::{
+    EdgeId, EdgeVec, FaceVec, HalfedgeId, HalfedgeVec, VertexId, VertexVec,
+};
 use crate::geometry::mesh::Mesh;
 use crate::geometry::triangle;
 use std::f64::consts::FRAC_PI_2;
@@ -32,6 +34,9 @@ const NEAR: f64 = 0.01;
 
 /// Length on either side of a border's edge over which teeth are none of the border's directions, in the same unit: about a cell of a grid of two thousand quads.
 const RAGGED: f64 = 0.02;
+
+/// The same for features: about three cells. Rims of discs that volumes leave turn to and fro by 50° at every edge.
+const ZIGZAG: f64 = 0.06;
 
 /// Most that curvature may weigh in a face, beside an edge: thin ones would say what they do not know.
 const MOST_PULL: f64 = 1.0;
@@ -103,11 +108,39 @@ fn along(
     let pull: FaceVec<[f64; 2]> = pull.collect();
     let size = area.iter().sum::<f64>().sqrt();
     let is_feature = surface.is_feature();
-    let is_border = |h| !is_feature[surface.connectivity.edge(h)];
-    let mut lean = leans(own, &angle, &length, is_border, RAGGED * size);
+    // The halves of an edge on the mirror, of which one is the surface's own.
+    let own_side = |h: HalfedgeId| {
+        let whole = surface.connectivity;
+        let side = whole.edge_halfedge(ground.base.edge(h));
+        let is_own = |h: &HalfedgeId| h.index() < own.halfedge_count();
+        Some(side)
+            .filter(is_own)
+            .or(whole.twin(side))
+            .unwrap_or(side)
+    };
+    let sides_of = |feature: &Feature| -> Vec<[HalfedgeId; 2]> {
+        let halfedges = feature.edges.iter().map(|&e| c.edge_halfedge(e));
+        let pairs = halfedges.filter_map(|h| Some([own_side(h), own_side(c.twin(h)?)]));
+        pairs.collect()
+    };
+    let sides: Vec<Vec<[HalfedgeId; 2]>> = features.iter().map(sides_of).collect();
+    let border = |h| (!is_feature[surface.connectivity.edge(h)]).then_some(0);
+    let mut lean = leans(own, &angle, &length, border, RAGGED * size);
+    // Each side of a feature is a line of its own: at an end on the surface it does not go on as the other.
+    let mut side_of = HalfedgeVec::filled(None, own.halfedge_count());
+    for (i, f) in features.iter().enumerate() {
+        for (&e, &v) in f.edges.iter().zip(&f.vertices) {
+            let h = c.edge_halfedge(e);
+            for h in [Some(h), c.twin(h)].into_iter().flatten() {
+                side_of[own_side(h)] = Some(2 * i + usize::from(c.tail(h) == v));
+            }
+        }
+    }
+    let zigzag = leans(own, &angle, &length, |h| side_of[h], ZIGZAG * size);
     let even = diffused(own, &angle, &area, NEAR * size).map_err(FieldError::from)?;
     let narrow = open_narrow(own, &angle, &area, &length);
-    own.halfedges().for_each(|h| lean[h] += even[h] + narrow[h]);
+    own.halfedges()
+        .for_each(|h| lean[h] += zigzag[h] + even[h] + narrow[h]);
     let mut field = cross_field(own, &angle, &area, &pull, &lean)?;
     let asked = GridCones {
         least: LEAST_QUARTERS,
@@ -135,22 +168,6 @@ fn along(
     };
     let cones = c.vertices().filter(|&v| curvature[v] != 0);
     let cones = cones.map(cone).collect();
-    // The halves of an edge on the mirror, of which one is the surface's own.
-    let own_side = |h: HalfedgeId| {
-        let whole = surface.connectivity;
-        let side = whole.edge_halfedge(ground.base.edge(h));
-        let is_own = |h: &HalfedgeId| h.index() < own.halfedge_count();
-        Some(side)
-            .filter(is_own)
-            .or(whole.twin(side))
-            .unwrap_or(side)
-    };
-    let sides_of = |feature: &Feature| {
-        let halfedges = feature.edges.iter().map(|&e| c.edge_halfedge(e));
-        let pairs = halfedges.filter_map(|h| Some([own_side(h), own_side(c.twin(h)?)]));
-        pairs.collect()
-    };
-    let sides = features.iter().map(sides_of).collect();
     let found = FromField {
         sides,
         ground: Arc::new((opened, ground)),

@@ -151,6 +151,25 @@ fn noise_has_no_features_and_a_fold_in_it_has() {
 }
 
 #[test]
+fn noise_that_meets_a_line_does_not_divide_it() {
+    // A fold beside which a vertex stands out.
+    let x: Vec<f64> = (0..=12).map(f64::from).collect();
+    let mesh = heights(&x, 20, |i, j| match (i, j) {
+        (7, 10) => -0.2,
+        _ => -(x[i] - 6.0).abs(),
+    });
+    let c = &mesh.connectivity;
+    let is_sharp = |e: EdgeId| bend(&mesh, e).to_degrees() >= 40.0;
+    let met = |v: &VertexId| c.outgoing(*v).filter(|&h| is_sharp(c.edge(h))).count() > 2;
+    let found = features(&mesh, &FeatureParams::default(), &[]).chains;
+    let [fold] = &found[..] else {
+        panic!("{} features", found.len());
+    };
+    assert_eq!(fold.edges.len(), 20);
+    assert!(fold.vertices.iter().any(met));
+}
+
+#[test]
 fn steps_as_wide_as_the_edges_of_a_mesh_are_no_features() {
     // Columns with four rises of 45°.
     let rises = |flat: &[f64], rise: &[f64]| {

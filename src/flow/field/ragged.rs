@@ -1,6 +1,6 @@
-//! Where borders of a surface go on the whole, though their edges turn to and fro.
+//! Where borders of a surface and features go on the whole, though their edges turn to and fro.
 //!
-//! Scans end in teeth, and so does what is cut out of a mesh face by face. A field that is drawn to such edges stands at 45° to the border, since that is what edges of ±30° or ±60° have as mean of their fourth powers, and makes a corner of every tooth. So where the
+//! Scans end in teeth, and so does what is cut out of a mesh face by face. A field that is drawn to such edges stands at 45° to the border, since that is what edges of ±30° or ±60° have as mean of their fourth powers, and makes a corner of every tooth. The rims that volumes leave discs turn to and fro likewise. So where the
 //! border turns both ways within a window of length, its edges count as if they pointed along the mean of directions there.
 //!
 //! *Enters:* a surface with boundary, its corner angles, and which halfedges are its border. *Leaves:* by how much the direction that each shall count for differs from its own. *Guaranteed:* 0 where the border turns one way only, as at a corner or along a hole; the sum of turns of a
@@ -16,7 +16,7 @@ const TO_AND_FRO: f64 = FRAC_PI_2;
 /// Windows have at most this part of a closed border on either side.
 const PART: f64 = 0.125;
 
-/// A border, or a part of one between features.
+/// A border, a part of one between features, or a side of a feature.
 struct Line {
     halfedges: Vec<HalfedgeId>,
     length: Vec<f64>,
@@ -25,16 +25,16 @@ struct Line {
     is_closed: bool,
 }
 
-/// See the module docs. `is_border`: halfedges without twin that are borders; `reach`: length of the window on either side of an edge, in the unit of `length`.
+/// See the module docs. `line`: the line that a halfedge without twin is of, if any, such as a border or a side of a feature; `reach`: length of the window on either side of an edge, in the unit of `length`.
 pub fn leans(
     c: &Connectivity,
     angle: &FaceVec<[f64; 3]>,
     length: &EdgeVec<f64>,
-    is_border: impl Fn(HalfedgeId) -> bool,
+    line: impl Fn(HalfedgeId) -> Option<usize>,
     reach: f64,
 ) -> HalfedgeVec<f64> {
     let mut leans = HalfedgeVec::filled(0.0, c.halfedge_count());
-    for line in lines(c, angle, length, is_border) {
+    for line in lines(c, angle, length, line) {
         let total: f64 = line.length.iter().sum();
         let reach = match line.is_closed {
             true => reach.min(PART * total),
@@ -101,14 +101,14 @@ struct Side {
     turns: f64,
 }
 
-/// All borders.
+/// All lines.
 fn lines(
     c: &Connectivity,
     angle: &FaceVec<[f64; 3]>,
     length: &EdgeVec<f64>,
-    is_border: impl Fn(HalfedgeId) -> bool,
+    line: impl Fn(HalfedgeId) -> Option<usize>,
 ) -> Vec<Line> {
-    let is_border = |h: HalfedgeId| c.twin(h).is_none() && is_border(h);
+    let line_of = |h: HalfedgeId| line(h).filter(|_| c.twin(h).is_none());
     // The halfedge of the boundary after one, and by how much that turns.
     let after = |h: HalfedgeId| {
         let mut next = c.next(h);
@@ -120,14 +120,15 @@ fn lines(
         (next, PI - theta)
     };
     let mut begins = HalfedgeVec::filled(true, c.halfedge_count());
-    for h in c.halfedges().filter(|&h| is_border(h)) {
-        begins[after(h).0] = false;
+    for h in c.halfedges().filter(|&h| line_of(h).is_some()) {
+        let next = after(h).0;
+        begins[next] &= line_of(next) != line_of(h);
     }
     let mut seen = HalfedgeVec::filled(false, c.halfedge_count());
     let mut lines = Vec::new();
     // Those that begin somewhere first: what is left is closed.
     for is_closed in [false, true] {
-        for first in c.halfedges().filter(|&h| is_border(h)) {
+        for first in c.halfedges().filter(|&h| line_of(h).is_some()) {
             if seen[first] || !(is_closed || begins[first]) {
                 continue;
             }
@@ -138,7 +139,7 @@ fn lines(
                 is_closed,
             };
             let mut h = first;
-            while is_border(h) && !std::mem::replace(&mut seen[h], true) {
+            while line_of(h) == line_of(first) && !std::mem::replace(&mut seen[h], true) {
                 let (next, turn) = after(h);
                 line.halfedges.push(h);
                 line.length.push(length[c.edge(h)]);

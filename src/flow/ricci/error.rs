@@ -182,17 +182,21 @@ fn not_converged_message(
             "the flow did not converge: after {iterations} steps the largest curvature error is {max_error:.3e} (bound {tolerance:.1e})"
         ),
     };
+    let breaks = if broken == 1 { "breaks" } else { "break" };
+    let counted = |n: usize| format!("{n} face{}", if n == 1 { "" } else { "s" });
     if broken > 0 && method.flips {
         message += &format!(
-            "{} {broken} faces of the flipped triangulation break the triangle inequality",
+            "{} {} of the flipped triangulation {breaks} the triangle inequality",
             if met { ", but" } else { " and" },
+            counted(broken),
         );
     } else if broken > 0 {
         let listed: Vec<String> = faces.iter().map(FaceId::to_string).collect();
         let more = if broken > faces.len() { ", …" } else { "" };
         message += &format!(
-            "{} {broken} faces break the triangle inequality (faces {}{more})",
+            "{} {} {breaks} the triangle inequality (faces {}{more})",
             if met { ", but" } else { " and" },
+            counted(broken),
             listed.join(", ")
         );
     }
@@ -240,7 +244,7 @@ fn remedy(method: Method, iterations: usize, broken: usize) -> String {
             "; a flat metric exists for these curvatures, but float64's 16 digits do not hold the angles of its thinnest faces: raise flow.curvature_tolerance, or spread the strongest cones' curvature over more vertices"
         }
         Scheme::VertexScaling => {
-            "; set flow.delaunay = true: with flips a solution exists always"
+            "; cones.strategy = \"field\" stretches faces less, and flow.scheme = \"tangential\" breaks none, at the price of angles; where faces may be divided, set flow.delaunay = true: with flips a solution exists always"
         }
         Scheme::InversiveDistance => {
             "; use the scheme `vertex-scaling` with flow.delaunay = true: with flips a solution exists always"
@@ -261,10 +265,10 @@ mod tests {
         let broken = [FaceId::new(4)];
         let fixed = method(Scheme::VertexScaling, false);
         let met = not_converged_message(fixed, 9, 1e-12, 1e-10, 1, &broken);
-        assert!(met.contains("the curvatures are met, but 1 faces break"));
+        assert!(met.contains("the curvatures are met, but 1 face breaks"));
         assert!(!met.contains("error"));
         let missed = not_converged_message(fixed, 9, 1.5, 1e-10, 1, &broken);
-        assert!(missed.contains("error is 1.500e0 (bound 1.0e-10) and 1 faces break"));
+        assert!(missed.contains("error is 1.500e0 (bound 1.0e-10) and 1 face breaks"));
         let away = runaway_message(method(Scheme::Thurston, false), 44, 52.0, 1.0);
         assert!(away.contains("(6) with equality only") && !away.contains("bound"));
     }

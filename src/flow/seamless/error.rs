@@ -5,6 +5,9 @@ use crate::flow::signature::Infeasible;
 use crate::flow::solve::SolveError;
 use crate::geometry::ids::{EdgeId, VertexVec};
 
+/// Errors of angles up to this, radians, that Newton's steps do not lower any more, are of rounding.
+const ROUNDING: f64 = 1e-5;
+
 /// Why there is no seamless metric.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SeamlessError {
@@ -40,7 +43,11 @@ pub enum SeamlessError {
     Infeasible(#[from] Infeasible),
     /// Newton's steps became ever shorter, or too many.
     #[error(
-        "no seamless metric was found: after {iterations} steps the largest error of a cone angle or a turning is {max_error:.3e} rad (bound {tolerance:.1e}), and {step:.1e} of a step was taken last; cones that are far from where the surface bends, or turnings far from its own, may have no metric: let the field choose them, or ask for other ones"
+        "no seamless metric was found: after {iterations} steps the largest error of a cone angle or a turning is {max_error:.3e} rad (bound {tolerance:.1e}), and {step:.1e} of a step was taken last; {}",
+        match *max_error <= ROUNDING {
+            true => "so little is what float64's 16 digits leave of angles of very thin faces: remove vertices that nearly coincide and faces without width from the mesh, or join them (repair.weld_tolerance = 1e-5)",
+            false => "cones that are far from where the surface bends, or turnings far from its own, may have no metric: let the field choose them, or ask for other ones",
+        }
     )]
     Stalled {
         /// Steps taken.

@@ -141,3 +141,32 @@ fn what_float32_rounds_twice_is_one_point() {
     );
     assert_eq!(count(&repaired(&below), "welded_vertices"), 0);
 }
+
+#[test]
+fn an_edge_that_a_point_hides_is_one_point_too() {
+    // A tetrahedron whose tip is a face with one edge that float32 would round away, and two that are a unit in its last place.
+    let positions = vec![
+        [0.0; 3],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [3e-8, 0.0, 1.0],
+        [0.0, 1e-15, 1.0],
+    ];
+    let sides = [
+        [0, 1, 4],
+        [0, 4, 3],
+        [1, 2, 5],
+        [1, 5, 4],
+        [2, 0, 3],
+        [2, 3, 5],
+    ];
+    let faces = [vec![[0, 2, 1], [3, 4, 5]], sides.to_vec()].concat();
+    let result = repaired(&corpus::soup(positions, faces));
+    let mesh = only(&result);
+    assert_eq!(
+        (mesh.positions.len(), mesh.connectivity.face_count()),
+        (4, 4)
+    );
+    assert_eq!(chi(mesh), 2);
+}

@@ -65,7 +65,7 @@ fn plane(faces: &[[u32; 3]], at: Vec<[f64; 2]>) -> Plane {
 
 impl Plane {
     fn leans(&self, reach: f64) -> HalfedgeVec<f64> {
-        leans(&self.c, &self.angle, &self.length, |_| true, reach)
+        leans(&self.c, &self.angle, &self.length, |_| Some(0), reach)
     }
 
     /// Corners that the smoothest field makes of the border.
@@ -133,15 +133,30 @@ fn ragged_borders_have_few_corners() {
     assert!(without > 40 && with < without / 8, "{with} of {without}");
 }
 
-/// Features keep their own directions, and part the border.
+/// What is of no line keeps its own directions, and parts lines.
 #[test]
-fn only_borders_lean() {
+fn only_lines_lean() {
     let ring = lattice(|[x, y]| (6.0..16.0).contains(&x.hypot(y)));
     let c = &ring.c;
     let is_left = |h: HalfedgeId| ring.at[c.tail(h).index()][0] < 0.0;
-    let leans = leans(c, &ring.angle, &ring.length, is_left, 2.0);
+    let line = |h| is_left(h).then_some(0);
+    let leans = leans(c, &ring.angle, &ring.length, line, 2.0);
     let border = c.halfedges().filter(|&h| c.twin(h).is_none());
     let (left, right): (Vec<HalfedgeId>, Vec<HalfedgeId>) = border.partition(|&h| is_left(h));
     assert!(right.iter().all(|&h| leans[h] == 0.0));
     assert!(left.iter().filter(|&&h| leans[h] != 0.0).count() > left.len() / 2);
+}
+
+/// Where lines follow each other, each is looked at by itself.
+#[test]
+fn a_corner_between_two_lines_stays() {
+    // Crenels of 60°: every edge is a line of its own, or all are one.
+    let strip = lattice(|[x, y]| x.abs() < 12.1 && y.abs() < 5.7);
+    let (c, reach) = (&strip.c, 3.0);
+    let lean = |line: &dyn Fn(HalfedgeId) -> Option<usize>| {
+        let leans = leans(c, &strip.angle, &strip.length, line, reach);
+        leans.iter().filter(|lean| lean.abs() > 0.1).count()
+    };
+    assert_eq!(lean(&|h| Some(h.index())), 0);
+    assert!(lean(&|_| Some(7)) > 60);
 }
