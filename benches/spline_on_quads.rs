@@ -56,6 +56,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             weight: 1.0,
             cell: cell as u32,
             at: [s, t],
+            border: None,
         })
     };
     let text = read_to_string(samples)?;

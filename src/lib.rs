@@ -22,21 +22,41 @@
 //! process of its own, and knows nothing of what a job computes.
 //!
 //! ```
-//! use affine_atlas::{build, config::Config, geometry::mesh::Soup};
+//! use affine_atlas::{build, config::Config, geometry::mesh::Soup, spline};
 //!
-//! // A tetrahedron: four cones of π, no flow needed beyond rounding.
-//! let soup = Soup::from_triangles(
-//!     vec![[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]],
-//!     vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
-//! );
+//! // Two triangles a side of a cube, each named by its corners.
+//! let corner = |i: u32| [0, 1, 2].map(|k| f64::from(i >> k & 1));
+//! let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+//! let faces = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
+//! let soup = Soup::from_triangles((0..8).map(corner).collect(), faces.collect());
 //! let mut config = Config::default();
-//! config.cones.count = Some(4);
-//! let atlases = build(&soup, &config, &())?;
-//! let atlas = atlases[0].as_ref().unwrap();
-//! assert_eq!(atlas.prescription.cones.len(), 4);
-//! assert!(atlas.metric.max_curvature_error < 1e-10);
-//! # Ok::<(), affine_atlas::job::BuildError>(())
+//! config.grid.cells = 54;
+//!
+//! // One atlas a component; `&()` watches nothing (see `observe::Observer`).
+//! for atlas in build(&soup, &config, &())? {
+//!     let atlas = atlas?;
+//!     // The surface, whose faces are parts of those given, and the texture coordinates of their corners.
+//!     let (mesh, layout) = (&atlas.mesh, &atlas.patches);
+//!     for face in mesh.connectivity.faces() {
+//!         let patch = &layout.patches[layout.face_patch[face].index()];
+//!         let texcoord = layout.uv[face].map(|uv| patch.packed(uv));
+//!         assert!(texcoord.as_flattened().iter().all(|x| (0.0..=1.0).contains(x)));
+//!     }
+//!     // A quad mesh, the flat metric, the maps between charts.
+//!     let grid = atlas.grid.as_ref().expect("a cube has room for one");
+//!     assert_eq!(grid.irregular().len(), 8);
+//!     assert!(atlas.metric.max_curvature_error < 1e-10);
+//!     let quarter_turns = atlas.charts.gluings.iter().map(|g| g.motion);
+//!     assert!(quarter_turns.count() > 0);
+//!     // A smooth surface, and a point of it in the middle of the first cell.
+//!     let spline = spline::fit(&atlas.gridded().expect("it has a grid"))?;
+//!     let jet = spline.with_limit(|limit| limit.at(0, [0.5, 0.5]));
+//!     assert!(jet.point.iter().all(|x| (-0.01..1.01).contains(x)));
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! For the flow alone, with curvatures of one's own, see [`flow::ricci::flow`].
 //!
 //! # Symbols
 //!

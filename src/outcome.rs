@@ -23,6 +23,8 @@ pub enum FailureKind {
     Memory,
     /// The result could not be written.
     Output,
+    /// Somebody asked to stop; in a manifest that is a state, not a failure.
+    Cancelled,
     /// An error of this program.
     Internal,
 }
@@ -39,6 +41,7 @@ impl FailureKind {
             Self::Timeout => "timeout",
             Self::Memory => "memory",
             Self::Output => "output",
+            Self::Cancelled => "cancelled",
             Self::Internal => "internal",
         }
     }

@@ -26,6 +26,13 @@ pub struct Patch {
     pub packed_offset: [f64; 2],
 }
 
+impl Patch {
+    /// Patch coordinates in the packed unit square, v up: `TEXCOORD_0` of glTF has 1 − v.
+    pub fn packed(&self, uv: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|i| self.packed_scale * uv[i] + self.packed_offset[i])
+    }
+}
+
 /// What geometry images are sampled over.
 #[derive(
     Clone,

@@ -1,14 +1,53 @@
 //! Checks a parsed text against [`KEYS`](super::keys::KEYS), where spans are still known.
 
+use super::Config;
 use super::error::ConfigError;
 use super::keys::{self, Kind};
 use super::limit::Limit;
 use super::scope::OF_THE_RUN;
-use super::source::Source;
+use super::source::{Source, syntax};
 use crate::flow::cones::PiMultiple;
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+
+impl Config {
+    /// Refuses values that no configuration text may hold, of a configuration that was made in code. One that was loaded has none.
+    ///
+    /// # Errors
+    /// The first such value, by key, at its place in the configuration as text.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        let text = toml::to_string(self).unwrap_or_else(|_| with_large_integers(self));
+        let source = Source::new("configuration", &text);
+        let table = DeTable::parse(&source.text).map_err(|e| syntax(&source, &e))?;
+        check(&source, table.get_ref())
+    }
+}
+
+/// The configuration as TOML, but with integers that TOML does not have.
+fn with_large_integers(config: &Config) -> String {
+    let value = serde_json::to_value(config).unwrap_or_default();
+    let members = value.as_object().into_iter().flatten();
+    let lines = members.map(|(key, value)| format!("{key} = {}\n", as_toml(value)));
+    lines.collect()
+}
+
+/// A value in one line of TOML.
+fn as_toml(value: &serde_json::Value) -> String {
+    use serde_json::Value;
+    match value {
+        Value::Array(items) => {
+            let items: Vec<String> = items.iter().map(as_toml).collect();
+            format!("[{}]", items.join(", "))
+        }
+        Value::Object(members) => {
+            let members = members.iter().filter(|(_, value)| !value.is_null());
+            let members = members.map(|(key, value)| format!("{key} = {}", as_toml(value)));
+            format!("{{ {} }}", members.collect::<Vec<_>>().join(", "))
+        }
+        other => other.to_string(),
+    }
+}
 
 /// Refuses the first key or value of the text that [`KEYS`](super::keys::KEYS) does not allow.
 pub(super) fn check(source: &Source, table: &DeTable<'_>) -> Result<(), ConfigError> {

@@ -633,3 +633,45 @@ fn a_key_of_an_earlier_version_is_refused_with_what_is_so_instead() {
     assert!(message.starts_with(start), "{message}");
     assert_eq!(error.remedy(), "remove `cones.objective`");
 }
+
+#[test]
+fn configurations_made_in_code_are_checked() {
+    assert_eq!(Config::default().check(), Ok(()));
+    for preset in Preset::ALL {
+        assert_eq!(
+            parse("text", preset.settings(), &[]).unwrap().check(),
+            Ok(())
+        );
+    }
+    let text = r#"
+        cones.list = [{ vertex = 3, curvature = "1/2" }, { point = [0, 1.5, -2], curvature = -0.5 }]
+        features.list = [[1, 2], [3, 4, 5]]
+        input.paths = ["a \"b\" \\ ü.obj"]
+    "#;
+    assert_eq!(parse("text", text, &[]).unwrap().check(), Ok(()));
+    let refused = |change: &dyn Fn(&mut Config)| {
+        let mut config = Config::default();
+        change(&mut config);
+        config.check().unwrap_err().to_string()
+    };
+    let says = |change: &dyn Fn(&mut Config), wanted: &str| {
+        let said = refused(change);
+        assert!(said.contains(wanted), "{said}");
+    };
+    let samples = "`grid.samples_per_cell` takes an integer from ";
+    says(&|c| c.grid.samples_per_cell = 0, samples);
+    says(&|c| c.grid.samples_per_cell = 1 << 40, samples);
+    says(
+        &|c| c.grid.cells = usize::MAX,
+        "was given 18446744073709551615",
+    );
+    says(
+        &|c| c.features.angle = f64::NAN,
+        "`features.angle` takes a number from",
+    );
+    says(&|c| c.flow.curvature_tolerance = -1.0, "was given -1");
+    says(
+        &|c| c.repair.weld_tolerance = f64::INFINITY,
+        "`repair.weld_tolerance`",
+    );
+}

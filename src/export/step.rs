@@ -6,7 +6,8 @@
 //! Each body is one item of the product and carries its name. A closed shell is a solid (`MANIFOLD_SOLID_BREP`, with cavities `BREP_WITH_VOIDS`), an open one a
 //! surface model (`SHELL_BASED_SURFACE_MODEL`). Where all are of one kind, they stand in the representation for that kind, otherwise
 //! in a plain `SHAPE_REPRESENTATION`. Faces, edges and vertices are shared within a shell, and each face is the whole of its
-//! surface. There are no curves in parameter space: programs find them from the edges.
+//! surface. Edges carry their straight lines in the parameters of the surfaces beside them: programs that look for them by projection go wrong where a
+//! surface bends back sharply.
 
 use crate::spline::shell::{Edge, Face, Shell};
 use crate::spline::surface::{BSplineCurve, BSplineSurface, DEGREE, ORDER};
@@ -42,10 +43,12 @@ const START: &str = "#1=APPLICATION_CONTEXT('managed model based 3d engineering'
 #16=UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(1.E-6),#20,'distance_accuracy_value','');
 #17=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT((#16))
 GLOBAL_UNIT_ASSIGNED_CONTEXT((#20,#14,#15))REPRESENTATION_CONTEXT('',''));
+#18=(GEOMETRIC_REPRESENTATION_CONTEXT(2)PARAMETRIC_REPRESENTATION_CONTEXT()REPRESENTATION_CONTEXT('',''));
 ";
 const SHAPE: Id = Id(9);
 const FRAME: Id = Id(13);
 const CONTEXT: Id = Id(17);
+const PLANE: Id = Id(18);
 const RESERVED: u64 = 23;
 
 /// The unit of coordinates.
@@ -210,7 +213,13 @@ fn check(shell: &Shell) -> Result<(), &'static str> {
             return Err("an edge without a proper curve or its ends");
         }
     }
-    for Face { surface, border } in &shell.faces {
+    for face in &shell.faces {
+        let (
+            Face {
+                surface, places, ..
+            },
+            border,
+        ) = (face, &face.border);
         let BSplineSurface { knots, control } = surface;
         let is_proper = knots.iter().all(|knots| fits(knots))
             && surface.size().iter().product::<usize>() == control.len()
@@ -218,7 +227,13 @@ fn check(shell: &Shell) -> Result<(), &'static str> {
         let has_edges = border
             .iter()
             .all(|&(e, _)| (e as usize) < shell.edges.len());
-        if !is_proper || border.is_empty() || !has_edges {
+        let have_places = places.len() == border.len()
+            && places
+                .as_flattened()
+                .as_flattened()
+                .iter()
+                .all(|x| x.is_finite());
+        if !is_proper || border.is_empty() || !has_edges || !have_places {
             return Err("a face without a proper surface or its edges");
         }
     }
@@ -233,6 +248,16 @@ impl Display for Id {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "#{}", self.0)
     }
+}
+
+/// An edge in the parameters of a surface beside it.
+#[derive(Clone, Copy)]
+struct Line {
+    /// Whether the face there is walked around against the edge.
+    is_backward: bool,
+    surface: Id,
+    /// From the first end of the edge to its second.
+    ends: [[f64; 2]; 2],
 }
 
 /// The entities of the data section, as they are written.
@@ -255,15 +280,38 @@ impl<W: Write> Data<'_, W> {
             let point = self.point(vertex)?;
             vertices.push(self.add(format_args!("VERTEX_POINT('',{point})"))?);
         }
+        let surfaces = shell.faces.iter().map(|face| self.surface(&face.surface));
+        let surfaces: Vec<Id> = surfaces.collect::<io::Result<_>>()?;
+        // Of every edge the surfaces beside it and its lines there, from its first end to its second; first the one that is walked so.
+        let mut lines: Vec<Vec<Line>> = vec![Vec::new(); shell.edges.len()];
+        for (face, &surface) in shell.faces.iter().zip(&surfaces) {
+            for (&(edge, is_forward), &[from, to]) in face.border.iter().zip(&face.places) {
+                lines[edge as usize].push(Line {
+                    is_backward: !is_forward,
+                    surface,
+                    ends: if is_forward { [from, to] } else { [to, from] },
+                });
+            }
+        }
         let mut edges = Vec::with_capacity(shell.edges.len());
-        for edge in &shell.edges {
+        for (edge, mut lines) in shell.edges.iter().zip(lines) {
             let curve = self.curve(&edge.curve)?;
+            lines.sort_by_key(|line| line.is_backward);
+            let knots = &edge.curve.knots;
+            let ends = [knots[0], knots[knots.len() - 1]];
+            let is_seam = matches!(&lines[..], [a, b] if a.surface.0 == b.surface.0);
+            let mut beside = Vec::with_capacity(lines.len());
+            for line in lines {
+                beside.push(self.line(line, ends)?);
+            }
+            let kind = if is_seam { "SEAM" } else { "SURFACE" };
+            let beside = list(beside);
+            let curve = self.add(format_args!("{kind}_CURVE('',{curve},{beside},.CURVE_3D.)"))?;
             let [from, to] = edge.ends.map(|vertex| vertices[vertex as usize]);
             edges.push(self.add(format_args!("EDGE_CURVE('',{from},{to},{curve},.T.)"))?);
         }
         let mut faces = Vec::with_capacity(shell.faces.len());
-        for face in &shell.faces {
-            let surface = self.surface(&face.surface)?;
+        for (face, surface) in shell.faces.iter().zip(surfaces) {
             let mut border = Vec::with_capacity(face.border.len());
             for &(edge, is_forward) in &face.border {
                 let (edge, sense) = (edges[edge as usize], logical(is_forward));
@@ -274,6 +322,22 @@ impl<W: Write> Data<'_, W> {
             faces.push(self.add(format_args!("ADVANCED_FACE('',({border}),{surface},.T.)"))?);
         }
         Ok(faces)
+    }
+
+    /// A line on a surface; its own parameter goes from the one number to the other.
+    fn line(&mut self, line: Line, ends: [f64; 2]) -> io::Result<Id> {
+        let mut points = Vec::with_capacity(2);
+        for [u, v] in line.ends.map(|p| p.map(real)) {
+            points.push(self.add(format_args!("CARTESIAN_POINT('',({u},{v}))"))?);
+        }
+        let (points, ends) = (list(points), list(ends.map(real)));
+        let curve = self.add(format_args!(
+            "B_SPLINE_CURVE_WITH_KNOTS('',1,{points},.UNSPECIFIED.,.F.,.F.,(2,2),{ends},.UNSPECIFIED.)"
+        ))?;
+        let repr = self.add(format_args!(
+            "DEFINITIONAL_REPRESENTATION('',({curve}),{PLANE})"
+        ))?;
+        self.add(format_args!("PCURVE('',{},{repr})", line.surface))
     }
 
     fn curve(&mut self, BSplineCurve { knots, control }: &BSplineCurve) -> io::Result<Id> {

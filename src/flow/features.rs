@@ -38,6 +38,9 @@ pub struct FeatureParams {
     pub file_first_vertex: u32,
     /// Weight of principal curvature beside smoothness.
     pub curvature: f64,
+    /// Side of the cells of the grid that the field is for, in square roots of the component's area; 0: unknown, or as small as one likes. A build sets it.
+    #[serde(skip)]
+    pub cell: f64,
 }
 
 impl Default for FeatureParams {
@@ -49,6 +52,7 @@ impl Default for FeatureParams {
             file: None,
             file_first_vertex: 0,
             curvature: 0.003,
+            cell: 0.0,
         }
     }
 }

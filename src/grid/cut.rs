@@ -245,7 +245,7 @@ fn relax_drawn(
     }
     let freedom = map.freedom.clone();
     kept.iter().for_each(|&v| map.freedom[v] = Freedom::Fixed);
-    let relaxed = relax::relax(map, unit);
+    let relaxed = relax::relax(map, unit, &());
     map.freedom = freedom;
     relaxed.map(|_| ())
 }

@@ -6,6 +6,9 @@ use crate::geometry::ids::{EdgeId, FaceId, VertexId};
 /// Why there is no grid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GridError {
+    /// Somebody asked to stop.
+    #[error("stopped before the grid was finished")]
+    Cancelled,
     /// The surface would have far more faces than the mesh.
     #[error(
         "with straight borders and cones of quarter turns, edges of the flat surface cross those of the mesh so often that {vertices} vertices become {refined}, more than {most}: divide the long thin faces of the mesh into faces of similar sides"

@@ -50,7 +50,7 @@ use crate::geometry::connectivity::Connectivity;
 use crate::geometry::ids::{EdgeVec, FaceVec, HalfedgeId, HalfedgeVec, VertexId, VertexVec};
 use crate::geometry::mesh::{Mesh, triangle_area};
 use crate::geometry::subdivision::Subdivision;
-use crate::observe::part;
+use crate::observe::{Observer, part};
 use blocks::Blocks;
 use density::Units;
 use islands::Islands;
@@ -150,15 +150,16 @@ pub(crate) fn check_size(vertices: usize, refined: usize) -> Result<(), GridErro
 /// # Errors
 /// Transitions that are no quarter turns, cones that no whole numbers fit, faces too thin for float64.
 ///
-/// `gutter`: texels between islands.
+/// `gutter`: texels between islands; `observer` may stop it.
 pub fn grid(
     surface: Charted,
     params: &GridParams,
     gutter: usize,
+    observer: &dyn Observer,
 ) -> Result<(Charted, PatchLayout, Grid), GridError> {
     let lines = lines(&surface, params.cells);
     let uv = &surface.central.uv;
-    let (map, grid, located) = made(&surface.mesh, uv, &lines, params, gutter)?;
+    let (map, grid, located) = made(&surface.mesh, uv, &lines, params, gutter, observer)?;
     let _part = part!("lift");
     let surface = charted::lift(surface, &map.sheet.fine);
     let layout = patches::layout(&surface, &grid, located);
@@ -172,6 +173,7 @@ fn made(
     lines: &EdgeVec<bool>,
     params: &GridParams,
     gutter: usize,
+    observer: &dyn Observer,
 ) -> Result<(GridMap, Grid, layout::Located), GridError> {
     let c = &mesh.connectivity;
     let part = part!("cone triangulation");
@@ -185,6 +187,7 @@ fn made(
         lines,
         turns,
         cones,
+        observer,
     };
     let of_part = |part: f64| of_cells(&surface, params, part * params.cells as f64, gutter);
     let error = match of_part(1.0) {
@@ -203,6 +206,7 @@ struct Flattened<'a> {
     lines: &'a EdgeVec<bool>,
     turns: HalfedgeVec<u8>,
     cones: cone_triangulation::ConeTriangulation,
+    observer: &'a dyn Observer,
 }
 
 /// Parts of the number of cells that are asked for in turn, where faces are turned over or lines are lost: other whole numbers leave them other room.
@@ -271,7 +275,7 @@ fn of_cells(
     let cell_size = (areas.sum::<f64>() / quads.quads.len() as f64).sqrt();
     let unit = Units::new(mesh, cell_size, params.density)?;
     drop(part);
-    let relaxed = relax::relax(&mut map, &unit)?;
+    let relaxed = relax::relax(&mut map, &unit, surface.observer)?;
     if wanted > FEW_CELLS && relaxed.squeezed > MOST_SQUEEZED {
         return Err(GridError::Rough {
             squeezed: relaxed.squeezed,

@@ -14,7 +14,7 @@ use super::squeezed::{BEFORE_FLAT, MOST_HALVINGS, SQUEEZED, SUFFICIENT, widen};
 use super::system::Equations;
 use super::triangle::is_turned_over;
 use crate::geometry::ids::FaceId;
-use crate::observe::part;
+use crate::observe::{Observer, part};
 
 /// Most steps.
 const MOST_STEPS: usize = 40;
@@ -39,7 +39,11 @@ pub struct Relaxed {
 }
 
 /// Moves vertices until the energy is least; see the module docs.
-pub(crate) fn relax(map: &mut GridMap, unit: &Units) -> Result<Relaxed, GridError> {
+pub(crate) fn relax(
+    map: &mut GridMap,
+    unit: &Units,
+    observer: &dyn Observer,
+) -> Result<Relaxed, GridError> {
     let _part = part!("relax");
     let c = &map.sheet.fine.connectivity;
     let mut place: Vec<[f64; 2]> = c.vertices().map(|v| map.place(v)).collect();
@@ -67,6 +71,9 @@ pub(crate) fn relax(map: &mut GridMap, unit: &Units) -> Result<Relaxed, GridErro
     let mut steps = 0;
     let mut before = vec![now];
     while steps < MOST_STEPS {
+        if observer.cancelled() {
+            return Err(GridError::Cancelled);
+        }
         let of_face = |i: usize| energy.derivatives(energy.faces[i], &place);
         equations.sum(of_face, |v| is_free[v]);
         let (step, slope) = equations.newton_step()?;

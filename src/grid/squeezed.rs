@@ -168,7 +168,7 @@ mod tests {
     #[test]
     fn a_squeezed_square_comes_back_to_an_isometry() {
         let (mut map, unit, _) = squeezed_square();
-        let relaxed = relax(&mut map, &unit).unwrap();
+        let relaxed = relax(&mut map, &unit, &()).unwrap();
         assert!(relaxed.energy[0] > 100.0, "{relaxed:?}");
         assert!((relaxed.energy[1] - 4.0).abs() < 1e-6, "{relaxed:?}");
         let c = &map.sheet.fine.connectivity;

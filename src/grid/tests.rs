@@ -496,7 +496,7 @@ fn assert_gridded(squares: &Squares, cells: usize) -> super::Grid {
     };
     let mesh = mesh(squares);
     let (map, grid, located) =
-        super::made(&mesh, &squares.uv, &squares.is_line, &params, 2).unwrap();
+        super::made(&mesh, &squares.uv, &squares.is_line, &params, 2, &()).unwrap();
     let c = &map.sheet.fine.connectivity;
     c.validate().unwrap();
     // Points found square by square are those found block by block.

@@ -12,6 +12,7 @@ use crate::grid::{self, Spacing};
 use crate::observe::Observer;
 use crate::parallel;
 use crate::product::AffineAtlas;
+use crate::repair::inside_out::inside_out;
 use crate::repair::{self, Component};
 
 /// Components of more faces are built alone.
@@ -204,14 +205,15 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Hands each component to `work`, and what that makes of it to `take`, in order.
+/// Hands each component to `work`, and what that makes of it to `take`, in order. Gives those that are inside out.
 pub(super) fn each<T: Send>(
     soup: &Soup,
     config: &Config,
     observer: &dyn Observer,
     work: impl Fn(Part<'_>) -> T + Sync,
     mut take: impl FnMut(T) -> Result<(), BuildError>,
-) -> Result<(), BuildError> {
+) -> Result<Vec<usize>, BuildError> {
+    config.check()?;
     observer.stage("repair", 0, 1);
     let repaired = repair::repair(soup, &config.repair)?;
     if !repaired.log.is_empty() {
@@ -226,6 +228,7 @@ pub(super) fn each<T: Send>(
     let requests = assigned(config)?;
     let otherwise = assigned(&config.on_flat_patches())?;
     let shares = shares::shares(&repaired.components);
+    let inside_out = inside_out(&repaired.components);
     let components = repaired.components.len();
     let wanted = requests.into_iter().zip(otherwise).zip(shares);
     let each = repaired.components.into_iter().zip(wanted).enumerate();
@@ -260,5 +263,6 @@ pub(super) fn each<T: Send>(
         }
     }
     let others = parallel::beside(small, worked);
-    others.into_iter().try_for_each(take)
+    others.into_iter().try_for_each(take)?;
+    Ok(inside_out)
 }

@@ -58,7 +58,7 @@ pub enum BuildError {
     Chart(#[from] ChartError),
     /// The surface is too fine for a grid.
     #[error(transparent)]
-    Grid(#[from] GridError),
+    Grid(GridError),
     /// The patches could not be made.
     #[error(transparent)]
     Patch(#[from] PatchError),
@@ -97,6 +97,15 @@ impl Unverified {
             failed: failed_of(verdicts),
             checks: verdicts.checks.len(),
         })
+    }
+}
+
+impl From<GridError> for BuildError {
+    fn from(error: GridError) -> Self {
+        match error {
+            GridError::Cancelled => Self::Cancelled,
+            error => Self::Grid(error),
+        }
     }
 }
 
@@ -142,7 +151,7 @@ impl BuildError {
             BuildError::Export(ExportError::NotFinite { .. }) => FailureKind::NotConverged,
             BuildError::Export(error) if error.is_internal() => FailureKind::Internal,
             BuildError::Export(_) => FailureKind::Output,
-            BuildError::Cancelled => FailureKind::Internal,
+            BuildError::Cancelled => FailureKind::Cancelled,
         }
     }
 }

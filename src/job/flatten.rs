@@ -43,13 +43,11 @@ pub(super) fn prescribed(
     requests: &Requests,
     config: &Config,
 ) -> Result<Prescription, ConeError> {
-    cones::prescribe(
-        mesh,
-        requests,
-        &config.cones,
-        &config.boundary,
-        &config.features,
-    )
+    let mut features = config.features.clone();
+    if config.domain() == Domain::Grid {
+        features.cell = (config.grid.cells as f64).sqrt().recip();
+    }
+    cones::prescribe(mesh, requests, &config.cones, &config.boundary, &features)
 }
 
 /// The mesh that cones and flow work on: for a grid with the vertices that it may want cones at, so far apart.

@@ -4,6 +4,7 @@ mod existence;
 
 use super::flatten::{prepared_at_first, prescribed};
 use super::listing::{self, MOST_LISTED, counted, left_out};
+use super::warnings::inside_out;
 use super::{BuildError, refine_for, shares};
 use crate::atlas::patch::Domain;
 use crate::config::Config;
@@ -15,6 +16,7 @@ use crate::flow::refine::ConnectivityRepair;
 use crate::geometry::mesh::Mesh;
 use crate::outcome::Failure;
 use crate::read;
+use crate::repair::inside_out::inside_out as find_inside_out;
 use crate::repair::{self, Component};
 use existence::Verdict;
 use std::f64::consts::PI;
@@ -68,6 +70,12 @@ pub fn inspect(path: &Path, config: &Config) -> Result<Inspection, BuildError> {
         counted(count, "component", "components")
     ));
     for note in &asset.notes {
+        whole(format!("note: {note}"));
+    }
+    if let Some(note) = inside_out(
+        &path.to_string_lossy(),
+        &find_inside_out(&repaired.components),
+    ) {
         whole(format!("note: {note}"));
     }
     let (mut failures, mut regions, mut others) = (Vec::new(), Vec::new(), 0);

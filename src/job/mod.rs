@@ -44,7 +44,7 @@ use std::path::Path;
 use std::time::Instant;
 
 /// Builds the atlas of every component of a mesh in memory. One bad component does not spoil the
-/// others; what concerns the whole mesh is the outer error. Images are without the channels that the mesh does not have
+/// others; what concerns the whole mesh, or that it was stopped, is the outer error. Images are without the channels that the mesh does not have
 /// ([`ImageParams::lacking`](crate::atlas::geometry_image::ImageParams::lacking)).
 pub fn build(
     soup: &Soup,
@@ -57,9 +57,12 @@ pub fn build(
         config,
         observer,
         |part| part.atlas(),
-        |atlas| {
-            atlases.push(atlas);
-            Ok(())
+        |atlas| match atlas {
+            Err(BuildError::Cancelled) => Err(BuildError::Cancelled),
+            atlas => {
+                atlases.push(atlas);
+                Ok(())
+            }
         },
     )?;
     Ok(atlases)
@@ -137,7 +140,7 @@ fn run_stages(
     let mut assembly = Assembly::default();
     let mut parts = Vec::new();
     let (mut told, mut untold) = (0, 0);
-    components::each(
+    let inside_out = components::each(
         &asset.soup,
         config,
         observer,
@@ -159,7 +162,11 @@ fn run_stages(
             Ok(())
         },
     )?;
-    if let Some(note) = warnings::without_folders(given, parts.len(), config) {
+    let of_asset = [
+        warnings::without_folders(given, parts.len(), config),
+        warnings::inside_out(given, &inside_out),
+    ];
+    for note in of_asset.into_iter().flatten() {
         tracing::warn!(asset = id, "{note}");
         outcome.notes.push(note);
     }

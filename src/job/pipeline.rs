@@ -52,7 +52,7 @@ pub(super) fn pipeline(
         Domain::Grid => {
             enter("grid")?;
             let (surface, patches, grid) =
-                grid::grid(surface, &config.grid, config.patches.padding)?;
+                grid::grid(surface, &config.grid, config.patches.padding, observer)?;
             (surface, patches, Some(grid), None)
         }
     };

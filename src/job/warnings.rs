@@ -36,6 +36,20 @@ pub(super) fn without_folders(given: &str, components: usize, config: &Config) -
     })
 }
 
+/// What is said where closed components look inward; they are given by number.
+pub(super) fn inside_out(given: &str, components: &[usize]) -> Option<String> {
+    let first = components.first()?;
+    let which = match components.len() {
+        1 => format!("component {first} of {given} is closed and inside out: its faces look"),
+        n => format!(
+            "{n} components of {given}, the first of them {first}, are closed and inside out: their faces look"
+        ),
+    };
+    Some(format!(
+        "{which} inward, in surface.glb as in the file; turn them over in the program that made them (`affine-atlas fit` does of itself)"
+    ))
+}
+
 /// What was asked for and could not be had, and much distortion, beginning with a verb.
 pub(super) fn warnings(atlas: &AffineAtlas, config: &Config) -> Vec<String> {
     let mut notes = Vec::new();

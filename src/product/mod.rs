@@ -15,6 +15,7 @@ use crate::geometry::ids::VertexVec;
 use crate::geometry::mesh::Mesh;
 use crate::grid::Grid;
 use crate::repair::RepairLog;
+use crate::spline::Gridded;
 use serde::{Deserialize, Serialize};
 
 /// A built component.
@@ -68,6 +69,13 @@ impl AffineAtlas {
     #[must_use]
     pub fn limited_by_float64(&self) -> bool {
         self.metric.max_curvature_error > self.flow.curvature_tolerance
+    }
+
+    /// What a spline surface is fitted to ([`fit`](crate::spline::fit())), where there is a grid.
+    #[must_use]
+    pub fn gridded(&self) -> Option<Gridded> {
+        let grid = self.grid.as_ref()?;
+        Some(Gridded::new(&self.mesh, &self.patches, grid))
     }
 }
 

@@ -11,8 +11,8 @@
 //! ```
 
 use crate::geometry::mesh::distance;
+use crate::repair::double_sided::drop_duplicates;
 use crate::repair::log::{Change, RemovalReason};
-use rayon::prelude::*;
 use std::collections::{BTreeSet, HashMap};
 
 /// A triangle is *collinear* where its two short sides together are not longer than its long side by more
@@ -68,115 +68,6 @@ pub fn clean(
         drop_duplicates(&mut faces, changes);
     }
     (faces, met)
-}
-
-/// Of faces with the same three vertices the first stays, whatever the orientation of the others, unless they are a
-/// sheet that hangs on something: see [`drop_flaps`].
-fn drop_duplicates(faces: &mut Vec<DraftFace>, changes: &mut Vec<Change>) {
-    let mut by_vertices: Vec<([u32; 3], u32)> = (0..)
-        .zip(&*faces)
-        .map(|(i, face)| (sorted(face.vertices).0, i))
-        .collect();
-    // By vertices, and of equals the first first.
-    by_vertices.par_sort_unstable();
-    let mut first_of: Vec<u32> = (0..faces.len() as u32).collect();
-    let mut two_sided = vec![false; faces.len()];
-    for same in by_vertices.chunk_by(|a, b| a.0 == b.0) {
-        let first = same[0].1;
-        let even = |i: u32| sorted(faces[i as usize].vertices).1;
-        for &(_, i) in &same[1..] {
-            first_of[i as usize] = first;
-            two_sided[first as usize] |= even(i) != even(first);
-        }
-    }
-    drop(by_vertices);
-    let is_first = |i: usize| first_of[i] as usize == i;
-    for i in (0..faces.len()).filter(|&i| !is_first(i)) {
-        changes.push(Change::RemovedFace {
-            face: faces[i].source,
-            reason: RemovalReason::DuplicateOf(faces[first_of[i] as usize].source),
-        });
-    }
-    let any_two_sided = two_sided.contains(&true);
-    let mut at = 0..;
-    two_sided.retain(|_| at.next().is_some_and(is_first));
-    let mut at = 0..;
-    faces.retain(|_| at.next().is_some_and(is_first));
-    if any_two_sided {
-        drop_flaps(faces, two_sided, changes);
-    }
-}
-
-/// Ascending vertices, and whether that is an even permutation.
-fn sorted([a, b, c]: [u32; 3]) -> ([u32; 3], bool) {
-    let mut key = [a, b, c];
-    key.sort_unstable();
-    let rotated = key == [a, b, c] || key == [b, c, a] || key == [c, a, b];
-    (key, rotated)
-}
-
-/// A face given from both sides is a sheet without volume. Where such sheets hang on nothing else, one side is the
-/// surface. Where they hang on an edge that has two or more other faces (a flap, or the walls between cells), both sides
-/// go: every edge loses two faces at a time, so what was closed stays closed.
-fn drop_flaps(faces: &mut Vec<DraftFace>, two_sided: Vec<bool>, changes: &mut Vec<Change>) {
-    let mut sides: Vec<(u32, u32, usize)> = faces
-        .iter()
-        .enumerate()
-        .flat_map(|(i, f)| {
-            let v = f.vertices;
-            [(v[0], v[1]), (v[1], v[2]), (v[2], v[0])].map(|(a, b)| (a.min(b), a.max(b), i))
-        })
-        .collect();
-    sides.sort_unstable();
-    let mut hangs = vec![false; faces.len()];
-    let mut belongs = vec![false; faces.len()];
-    let mut neighbours: Vec<Vec<usize>> = vec![Vec::new(); faces.len()];
-    for edge in sides.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-        let (flat, solid): (Vec<usize>, Vec<usize>) =
-            edge.iter().map(|side| side.2).partition(|&i| two_sided[i]);
-        for pair in flat.windows(2) {
-            neighbours[pair[0]].push(pair[1]);
-            neighbours[pair[1]].push(pair[0]);
-        }
-        for i in flat {
-            hangs[i] |= solid.len() >= 2;
-            belongs[i] |= solid.len() == 1;
-        }
-    }
-    let mut goes = vec![false; faces.len()];
-    let mut seen = vec![false; faces.len()];
-    for seed in (0..faces.len()).filter(|&i| two_sided[i]) {
-        if seen[seed] {
-            continue;
-        }
-        let mut sheet = vec![seed];
-        seen[seed] = true;
-        let mut next = 0;
-        while next < sheet.len() {
-            for &j in &neighbours[sheet[next]] {
-                if !seen[j] {
-                    seen[j] = true;
-                    sheet.push(j);
-                }
-            }
-            next += 1;
-        }
-        if sheet.iter().any(|&i| hangs[i]) && !sheet.iter().any(|&i| belongs[i]) {
-            sheet.iter().for_each(|&i| goes[i] = true);
-        }
-    }
-    let mut i = 0;
-    faces.retain(|face| {
-        let stays = !goes[i];
-        i += 1;
-        if !stays {
-            changes.push(Change::RemovedFace {
-                face: face.source,
-                reason: RemovalReason::Flap,
-            });
-        }
-        stays
-    });
 }
 
 /// The corner that lies on the opposite side, where the face is collinear.

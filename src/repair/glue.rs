@@ -30,9 +30,12 @@ struct Sheets {
     open: Vec<bool>,
 }
 
-/// Joins the faces; see the module docs of [`crate::repair`].
-pub fn glue(faces: &[DraftFace], positions: &[[f64; 3]], changes: &mut Vec<Change>) -> Gluing {
-    let mut sides: Vec<(u32, u32, u32)> = Vec::with_capacity(3 * faces.len());
+/// The lower and the higher vertex of a side, and its number.
+pub type Side = (u32, u32, u32);
+
+/// The sides of all faces, sorted: those at one edge follow each other.
+pub fn sides(faces: &[DraftFace]) -> Vec<Side> {
+    let mut sides = Vec::with_capacity(3 * faces.len());
     for (f, face) in faces.iter().enumerate() {
         for k in 0..3 {
             let (a, b) = (face.vertices[k], face.vertices[(k + 1) % 3]);
@@ -40,6 +43,16 @@ pub fn glue(faces: &[DraftFace], positions: &[[f64; 3]], changes: &mut Vec<Chang
         }
     }
     sides.par_sort_unstable();
+    sides
+}
+
+/// Joins the faces at their sides, which are sorted; see the module docs of [`crate::repair`].
+pub fn glue(
+    faces: &[DraftFace],
+    sides: &[Side],
+    positions: &[[f64; 3]],
+    changes: &mut Vec<Change>,
+) -> Gluing {
     let mut partner = vec![NONE; 3 * faces.len()];
     let edges = || sides.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
     for edge in edges().filter(|edge| edge.len() == 2) {

@@ -12,6 +12,8 @@ pub enum RemovalReason {
     Collinear,
     /// An earlier face (named) has the same three vertices.
     DuplicateOf(u32),
+    /// The input has the flat sheet that it lies in from both sides, in other triangles, and this is the other side.
+    Back,
     /// The input has it from both sides, and it hangs on an edge that has two faces without it: a sheet without volume.
     Flap,
 }
@@ -93,6 +95,9 @@ impl fmt::Display for Change {
                 RemovalReason::DuplicateOf(first) => {
                     write!(f, "face {face} has the same vertices as face {first}")
                 }
+                RemovalReason::Back => {
+                    write!(f, "face {face} is the back of a flat sheet")
+                }
                 RemovalReason::Flap => {
                     write!(
                         f,
@@ -136,12 +141,13 @@ pub struct RepairLog {
 }
 
 /// Names of the counts, as `atlas.json` lists them.
-const COUNTS: [&str; 12] = [
+const COUNTS: [&str; 13] = [
     "welded_vertices",
     "removed_faces",
     "removed_degenerate_faces",
     "removed_collinear_faces",
     "removed_duplicate_faces",
+    "removed_back_faces",
     "removed_flap_faces",
     "split_faces",
     "flipped_faces",
@@ -176,6 +182,7 @@ impl RepairLog {
                         RemovalReason::RepeatedVertex => add("removed_degenerate_faces", 1),
                         RemovalReason::Collinear => add("removed_collinear_faces", 1),
                         RemovalReason::DuplicateOf(_) => add("removed_duplicate_faces", 1),
+                        RemovalReason::Back => add("removed_back_faces", 1),
                         RemovalReason::Flap => add("removed_flap_faces", 1),
                     }
                 }

@@ -13,10 +13,11 @@
 //! 2. **clean** ([`clean`]): faces with a repeated vertex and duplicates go; faces without area whose
 //!    corners lie on one line, to within what float32 rounds, are taken out so that no T-junction stays; where that shows that two vertices are one point of the line, both steps
 //!    are done again with these joined.
-//! 3. **glue** ([`glue`]): which sides of faces are joined. Two faces at an edge always are; where more
+//! 3. **double-sided sheets** ([`double_sided`]): of flat sheets given from both sides one stays.
+//! 4. **glue** ([`glue`]): which sides of faces are joined. Two faces at an edge always are; where more
 //!    meet, those that enclose a solid wedge are joined and the rest stays open. Orientation flows
 //!    across edges with exactly two faces, and the minority is flipped.
-//! 4. **assemble** ([`assemble`]): one vertex a fan, one mesh a component, doubled edges split.
+//! 5. **assemble** ([`assemble`]): one vertex a fan, one mesh a component, doubled edges split.
 //!
 //! *Guaranteed:* surviving vertices and faces of components with at most 131,072 faces keep the order of the file (copies and new vertices
 //! come last), larger ones lie along a space-filling curve; the surface stays where it is, to two millionths of its size, when nothing is welded with a tolerance; same input, same output.
@@ -25,7 +26,9 @@
 
 pub mod assemble;
 pub mod clean;
+pub mod double_sided;
 pub mod glue;
+pub mod inside_out;
 pub mod log;
 pub mod weld;
 
@@ -278,7 +281,7 @@ pub fn repair(soup: &Soup, params: &RepairParams) -> Result<Repaired, RepairErro
     // Products of lengths in source units could overflow or vanish.
     let positions: Vec<_> = soup.positions.iter().map(|&p| frame.enter(p)).collect();
     let mut all_met = Vec::new();
-    let (mut changes, stands_for, draft) = loop {
+    let (mut changes, stands_for, mut draft) = loop {
         let mut changes = Vec::new();
         let stands_for = weld::weld(&positions, &soup.faces, params, &all_met, &mut changes);
         let welded = changes.len();
@@ -299,7 +302,11 @@ pub fn repair(soup: &Soup, params: &RepairParams) -> Result<Repaired, RepairErro
         });
     }
     check_extent(&positions, &soup.faces, &draft, &frame)?;
-    let gluing = glue::glue(&draft, &positions, &mut changes);
+    let mut sides = glue::sides(&draft);
+    if double_sided::drop_backs(&mut draft, &sides, &positions, &mut changes) {
+        sides = glue::sides(&draft);
+    }
+    let gluing = glue::glue(&draft, &sides, &positions, &mut changes);
     let repaired = assemble::assemble(soup, &stands_for, &draft, &gluing, changes);
     let components = repaired.components.len();
     let cuts = repaired.log.counts().get("cut_edges").copied();

@@ -26,13 +26,11 @@ const ELSEWHERE: f64 = 5.0;
 /// Places along an edge where normals of both faces are compared, a unit of cells.
 const ALONG: usize = 8;
 
-/// Faces, and which part of a side of a face its border edges are.
+/// Faces, and what edges are.
 #[derive(Clone, Debug)]
 pub struct Faces {
     /// The shell.
     pub shell: Shell,
-    /// Of every edge of every face's border, the side (0: v = 0, 1: last u, 2: last v, 3: u = 0) and the parameters where it begins and ends.
-    pub ranges: Vec<Vec<(u8, [f64; 2])>>,
     /// Halvings towards irregular points.
     pub halvings: u32,
     /// Edges along creases.
@@ -235,10 +233,11 @@ fn joined(
     };
     let mut known: FxHashMap<CellSide, u32> = FxHashMap::default();
     let (mut edges, mut is_crease, mut beside) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut faces, mut ranges) = (Vec::new(), Vec::new());
+    let mut faces = Vec::new();
     let mut is_closed = true;
     for (block, surface) in blocks.iter().zip(surfaces) {
-        let (mut border, mut own) = (Vec::new(), Vec::new());
+        let (mut border, mut places) = (Vec::new(), Vec::new());
+        let [w, h] = block.cells.map(|cells| cells as f64);
         for s in 0..4 {
             let side = side_of(block, s);
             let curve = surface.side(s);
@@ -275,12 +274,20 @@ fn joined(
                     }
                 };
                 border.push(edge);
-                own.push((s as u8, range));
+                places.push(range.map(|along| match s {
+                    0 => [along, 0.0],
+                    1 => [w, along],
+                    2 => [along, h],
+                    _ => [0.0, along],
+                }));
                 begin = i;
             }
         }
-        faces.push(Face { surface, border });
-        ranges.push(own);
+        faces.push(Face {
+            surface,
+            border,
+            places,
+        });
     }
     Faces {
         shell: Shell {
@@ -289,7 +296,6 @@ fn joined(
             faces,
             is_closed,
         },
-        ranges,
         halvings,
         is_crease,
         beside,
@@ -362,16 +368,10 @@ impl Faces {
     }
 
     fn normal(&self, (f, i): (usize, usize), t: f64) -> [f64; 3] {
-        let (side, [from, to]) = self.ranges[f][i];
-        let surface = &self.shell.faces[f].surface;
-        let last = [0, 1].map(|axis| surface.knots[axis][surface.knots[axis].len() - 1]);
-        let along = from + t * (to - from);
-        let jet = surface.at(match side {
-            0 => [along, 0.0],
-            1 => [last[0], along],
-            2 => [along, last[1]],
-            _ => [0.0, along],
-        });
+        let face = &self.shell.faces[f];
+        let [from, to] = face.places[i];
+        let at = [0, 1].map(|axis| from[axis] + t * (to[axis] - from[axis]));
+        let jet = face.surface.at(at);
         cross(jet.tangent[0], jet.tangent[1])
     }
 }

@@ -11,9 +11,9 @@ use super::error::SplineError;
 use super::evaluator::Evaluator;
 use super::fairness::{Difference, differences};
 use super::gridded::Sample;
-use super::limit::Limit;
+use super::limit::{Limit, along_side};
 use crate::flow::solve::SymmetricSolver;
-use crate::geometry::mesh::{dot, sub};
+use crate::geometry::mesh::{dot, norm, sub};
 use crate::parallel;
 use rayon::prelude::*;
 
@@ -55,11 +55,15 @@ struct ByCell<'s> {
     order: Vec<u32>,
 }
 
-/// A sample beside the surface.
+/// A sample beside the surface, or beside its border.
 struct Beside {
     off: [f64; 3],
-    normal: [f64; 3],
-    along: f64,
+    /// Normal of the surface, or tangent of the border.
+    direction: [f64; 3],
+    /// What distances along the direction count.
+    towards: f64,
+    /// And others.
+    across: f64,
 }
 
 impl<'s> ByCell<'s> {
@@ -91,19 +95,33 @@ impl Beside {
     fn new(limit: &Limit<'_>, sample: &Sample) -> Self {
         let (point, normal) = limit.normal(sample.cell, sample.at);
         let off = sub(sample.point, point);
-        let towards = dot(off, normal);
-        let is_nearest = towards * towards > TOWARDS * dot(off, off);
+        let Some(side) = sample.border else {
+            let towards = dot(off, normal);
+            let is_nearest = towards * towards > TOWARDS * dot(off, off);
+            return Self {
+                off,
+                direction: normal,
+                towards: 1.0,
+                across: if is_nearest { ALONG } else { 1.0 },
+            };
+        };
+        let tangent = along_side(side, limit.at(sample.cell, sample.at).tangent);
+        let length = norm(tangent);
+        let direction = tangent.map(|x| if length > 0.0 { x / length } else { 0.0 });
+        let along = dot(off, direction);
+        let is_nearest = along * along < (1.0 - TOWARDS) * dot(off, off);
         Self {
             off,
-            normal,
-            along: if is_nearest { ALONG } else { 1.0 },
+            direction,
+            towards: if is_nearest { ALONG } else { 1.0 },
+            across: 1.0,
         }
     }
 
-    /// A difference, with less of what is along the tangent plane.
+    /// A difference, with less of what is along the tangent plane, or along the border.
     fn weighed(&self, x: [f64; 3]) -> [f64; 3] {
-        let towards = (1.0 - self.along) * dot(x, self.normal);
-        [0, 1, 2].map(|i| self.along * x[i] + towards * self.normal[i])
+        let towards = (self.towards - self.across) * dot(x, self.direction);
+        [0, 1, 2].map(|i| self.across * x[i] + towards * self.direction[i])
     }
 }
 
@@ -201,7 +219,7 @@ impl<'a> Equations<'a> {
     }
 
     fn fair(&self, samples: &[Sample]) -> f64 {
-        let area: f64 = samples.iter().map(|s| s.area).sum();
+        let area: f64 = samples.iter().map(Sample::own_area).sum();
         FAIR * area / self.cage.vertices as f64
     }
 

@@ -7,7 +7,7 @@ use super::equations::{Equations, GRADIENTS};
 use super::error::SplineError;
 use super::folds::{Folds, shortened, unfolded};
 use super::gridded::Sample;
-use super::limit::{Limit, Place};
+use super::limit::Limit;
 use crate::geometry::mesh::{norm, sub};
 use rayon::prelude::*;
 
@@ -32,11 +32,11 @@ pub fn fit(
     let (cage, evaluator) = (equations.cage, equations.evaluator);
     // Those of a cell are read one after the other, many times.
     samples.sort_by_key(|s| s.cell);
-    let given: Vec<Place> = samples.iter().map(Sample::place).collect();
+    let given = samples.to_vec();
     let put_back = |samples: &mut [Sample], folds: &Folds| {
-        for (sample, place) in samples.iter_mut().zip(&given) {
-            if folds.is_in(place.cell) || folds.is_in(sample.cell) {
-                (sample.cell, sample.at, sample.weight) = (place.cell, place.at, 1.0);
+        for (sample, given) in samples.iter_mut().zip(&given) {
+            if folds.is_in(given.cell) || folds.is_in(sample.cell) {
+                *sample = *given;
             }
         }
     };
@@ -71,8 +71,9 @@ fn weigh(limit: &Limit<'_>, samples: &mut [Sample]) {
         .par_iter()
         .map(|s| norm(sub(limit.at(s.cell, s.at).point, s.point)))
         .collect();
-    let area: f64 = samples.iter().map(|s| s.area).sum();
-    let squares: f64 = samples.iter().zip(&off).map(|(s, d)| s.area * d * d).sum();
+    let area: f64 = samples.iter().map(Sample::own_area).sum();
+    let squares = samples.iter().zip(&off).map(|(s, d)| s.own_area() * d * d);
+    let squares: f64 = squares.sum();
     let large = FAR * (squares / area).sqrt();
     if large > 0.0 {
         for (sample, d) in samples.iter_mut().zip(&off) {
@@ -81,11 +82,15 @@ fn weigh(limit: &Limit<'_>, samples: &mut [Sample]) {
     }
 }
 
-/// Moves the places of samples to the nearest points of a surface.
+/// Moves the places of samples to the nearest points of a surface, or of its border.
 pub fn move_places(limit: &Limit<'_>, samples: &mut [Sample]) {
     samples.par_chunks_mut(RUN).for_each(|run| {
         for sample in run {
-            let place = limit.nearest(sample.point, sample.place());
+            let mut place = sample.place();
+            match &mut sample.border {
+                Some(side) => (place, *side) = limit.nearest_on_border(sample.point, place, *side),
+                None => place = limit.nearest(sample.point, place),
+            }
             (sample.cell, sample.at) = (place.cell, place.at);
         }
     });

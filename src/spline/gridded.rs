@@ -5,10 +5,12 @@
 use super::cage::Cage;
 use super::creases::{BLUNT, SHARP, creased};
 use super::error::SplineError;
-use super::limit::Place;
+use super::limit::{Place, from_side, to_side};
+use crate::atlas::patches::PatchLayout;
 use crate::geometry::disjoint_sets::UnionFind;
-use crate::geometry::mesh::{cross, dot, norm, sub};
-use rustc_hash::FxHashMap;
+use crate::geometry::mesh::{Mesh, cross, dot, norm, sub};
+use crate::grid::Grid;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 /// A surface and its grid, as a folder has them.
 #[derive(Clone, Debug)]
@@ -46,6 +48,8 @@ pub struct Sample {
     pub cell: u32,
     /// Where in it.
     pub at: [f64; 2],
+    /// The side of the cell that it lies on and stays on, if it is one of the border. It stands for a strip of the surface then that other samples stand for, too.
+    pub border: Option<u8>,
 }
 
 impl Sample {
@@ -54,6 +58,14 @@ impl Sample {
         Place {
             cell: self.cell,
             at: self.at,
+        }
+    }
+
+    /// Area that no other sample stands for.
+    pub fn own_area(&self) -> f64 {
+        match self.border {
+            Some(_) => 0.0,
+            None => self.area,
         }
     }
 }
@@ -66,6 +78,12 @@ const SMALL: f64 = 0.25;
 const MOST_PARTS: f64 = 64.0;
 /// Faces whose normals differ by no more are in one plane, radians.
 const FLAT: f64 = 1e-3;
+/// Parts of edges of the border with samples at both ends and in the middle are no longer, cells.
+const BORDER_PART: f64 = 0.5;
+/// Weights of these (Simpson).
+const ENDS_AND_MIDDLE: [f64; 3] = [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0];
+/// So far towards the face, of the way, a point on its side is in the cell that the face is in.
+const INWARD: f64 = 1e-6;
 /// How far from a line of the grid an edge that lies on it may be, cells.
 const ON_LINE: f64 = 1e-9;
 
@@ -91,9 +109,36 @@ impl Cells {
         }
         None
     }
+
+    /// The cell and side on whose line the middle of an edge lies, and the corner of the cell; `apex` is across the edge in the face.
+    fn side(&self, block: u32, p: [f64; 2], apex: [f64; 2]) -> Option<(u32, u8, [f64; 2])> {
+        let inside = [0, 1].map(|i| p[i] + INWARD * (apex[i] - p[i]));
+        let (cell, at) = self.find(block, inside)?;
+        let corner = [0, 1].map(|i| (inside[i] - at[i]).round());
+        let [s, t] = [0, 1].map(|i| p[i] - corner[i]);
+        let off = [t, 1.0 - s, 1.0 - t, s];
+        let side = (0..4).find(|&k| off[k].abs() <= ON_LINE)?;
+        Some((cell, side as u8, corner))
+    }
 }
 
 impl Gridded {
+    /// A surface on its grid, in units of the mesh; `layout`: of its blocks.
+    pub fn new(mesh: &Mesh, layout: &PatchLayout, grid: &Grid) -> Self {
+        let faces = mesh.connectivity.faces();
+        let cells = grid.cells_in_blocks();
+        Self {
+            positions: mesh.positions.as_slice().to_vec(),
+            faces: mesh.connectivity.to_faces(),
+            block: faces.map(|f| layout.face_patch[f].index() as u32).collect(),
+            uv: layout.uv.as_slice().to_vec(),
+            points: grid.points.clone(),
+            cells: cells.iter().map(|c| c.corners).collect(),
+            cell_block: cells.iter().map(|c| c.block).collect(),
+            cell_at: cells.iter().map(|c| c.at).collect(),
+        }
+    }
+
     /// Least and greatest coordinates of vertices.
     pub fn bounds(&self) -> ([f64; 3], [f64; 3]) {
         let none = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
@@ -295,11 +340,73 @@ impl Gridded {
                     weight: 1.0,
                     cell,
                     at,
+                    border: None,
                 });
             }
         }
+        self.add_border(&cells, &normals, &mut samples);
         Ok(samples)
     }
+
+    /// Adds samples of the border, for a strip as wide as a cell: samples inside faces do not say where it ends. Corners of the border stand for a cell each.
+    fn add_border(&self, cells: &Cells, normals: &[[[f64; 3]; 3]], samples: &mut Vec<Sample>) {
+        let ends = |corners: &[u32; 3]| [0, 1, 2].map(|k| [corners[k], corners[(k + 1) % 3]]);
+        let all: FxHashSet<[u32; 2]> = self.faces.iter().flat_map(ends).collect();
+        let area: f64 = samples.iter().map(|s| s.area).sum();
+        let width = (area / self.cells.len() as f64).sqrt();
+        for (f, corners) in self.faces.iter().enumerate() {
+            for (k, [a, b]) in ends(corners).into_iter().enumerate() {
+                if all.contains(&[b, a]) {
+                    continue;
+                }
+                let uv = [self.uv[f][k], self.uv[f][(k + 1) % 3]];
+                let [p, q] = [a, b].map(|v| self.positions[v as usize]);
+                let length = norm(sub(q, p));
+                for [from, to] in pieces(uv) {
+                    let along = |x: f64, i: usize| uv[0][i] + x * (uv[1][i] - uv[0][i]);
+                    let middle = [0, 1].map(|i| along(0.5 * (from + to), i));
+                    let Some((cell, side, corner)) =
+                        cells.side(self.block[f], middle, self.uv[f][(k + 2) % 3])
+                    else {
+                        continue;
+                    };
+                    for (part, weight) in [0.0, 0.5, 1.0].into_iter().zip(ENDS_AND_MIDDLE) {
+                        let x = from + part * (to - from);
+                        let at = [0, 1].map(|i| (along(x, i) - corner[i]).clamp(0.0, 1.0));
+                        let place = to_side(side, at)[0];
+                        samples.push(Sample {
+                            point: [0, 1, 2].map(|i| p[i] + x * (q[i] - p[i])),
+                            normal: normals[f][k],
+                            area: weight * (to - from) * length * width,
+                            weight: 1.0,
+                            cell,
+                            at: from_side(side, [place, 0.0]),
+                            border: Some(side),
+                        });
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Parts of a segment in a block that lie on one edge of cells and are no longer than [`BORDER_PART`], from 0 to 1.
+fn pieces([p, q]: [[f64; 2]; 2]) -> Vec<[f64; 2]> {
+    let span = [0, 1].map(|i| q[i] - p[i]);
+    let long = usize::from(span[1].abs() > span[0].abs());
+    let (from, span) = (p[long], span[long]);
+    let mut ends = vec![0.0, 1.0];
+    let (low, high) = (from.min(from + span), from.max(from + span));
+    let lines = (low.floor() as i64 + 1..high.ceil() as i64).map(|x| (x as f64 - from) / span);
+    ends.extend(lines.filter(|x| (0.0..=1.0).contains(x)));
+    ends.sort_by(f64::total_cmp);
+    let divided = |w: &[f64]| {
+        let parts = ((w[1] - w[0]) * span.abs() / BORDER_PART).ceil().max(1.0);
+        let (from, step) = (w[0], (w[1] - w[0]) / parts);
+        let of = move |i: usize| [from + i as f64 * step, from + (i + 1) as f64 * step];
+        (0..parts as usize).map(of)
+    };
+    ends.windows(2).flat_map(divided).collect()
 }
 
 /// Places of three samples in each of parts² equal parts of a triangle, by barycentric coordinates; quadratic functions are integrated exactly (Strang and Fix 1973).
@@ -322,3 +429,7 @@ fn places(parts: usize) -> impl Iterator<Item = [f64; 3]> {
         })
     })
 }
+
+#[cfg(test)]
+#[path = "tests/border.rs"]
+mod tests;

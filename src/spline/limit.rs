@@ -111,6 +111,28 @@ impl<'a> Limit<'a> {
         (jet.point, normal.unwrap_or([0.0; 3]))
     }
 
+    /// The same for a place on a side of the border, along this; gives the side it comes to, too.
+    pub fn nearest_on_border(&self, point: [f64; 3], place: Place, side: u8) -> (Place, u8) {
+        let mut now = (place, side);
+        let mut jet = self.at(place.cell, place.at);
+        for _ in 0..MOST_STEPS {
+            let (off, tangent) = (sub(point, jet.point), along_side(now.1, jet.tangent));
+            let mut step = dot(tangent, off) / dot(tangent, tangent);
+            if !step.is_finite() || step.abs() < LEAST_STEP {
+                break;
+            }
+            step = step.clamp(-MOST_STEP, MOST_STEP);
+            let mut tries = (0..3).map(|i| {
+                let next = slide(self.cage, now.0, now.1, step / 4.0f64.powi(i));
+                (next, self.at(next.0.cell, next.0.at))
+            });
+            let nearer = tries.find(|(_, jet)| norm(sub(point, jet.point)) < norm(off));
+            let Some((next, there)) = nearer else { break };
+            (now, jet) = (next, there);
+        }
+        now
+    }
+
     /// Moves a place nearer to being that of the nearest point of the surface; it does not cross creases.
     pub fn nearest(&self, point: [f64; 3], mut place: Place) -> Place {
         let mut jet = self.at(place.cell, place.at);
@@ -153,8 +175,44 @@ impl<'a> Limit<'a> {
     }
 }
 
+/// Goes along the border from a place on a side of it, in the direction of the side where `step` is positive, round to the sides of other cells but not past corners.
+fn slide(cage: &Cage, place: Place, side: u8, step: f64) -> (Place, u8) {
+    let (mut cell, mut k) = (place.cell, side);
+    let mut x = to_side(k, place.at)[0] + step;
+    for _ in 0..MOST_CELLS {
+        let (end, back) = match x {
+            x if x > 1.0 => ((cell, (k + 1) & 3), false),
+            x if x < 0.0 => ((cell, k), true),
+            _ => break,
+        };
+        if cage.is_corner[cage.tail(end) as usize] {
+            break;
+        }
+        // Around the end, over the cells there.
+        let turn = if back { 3 } else { 1 };
+        let mut next = (cell, (k + turn) & 3);
+        while let Some((other, l)) = cage.across[next.0 as usize][usize::from(next.1)] {
+            next = (other, (l + turn) & 3);
+        }
+        (cell, k) = next;
+        x += if back { 1.0 } else { -1.0 };
+    }
+    let at = from_side(k, [x.clamp(0.0, 1.0), 0.0]);
+    (Place { cell, at }, k)
+}
+
+/// The derivative along side k of a cell.
+pub(super) fn along_side(k: u8, [u, v]: [[f64; 3]; 2]) -> [f64; 3] {
+    match k {
+        0 => u,
+        1 => v,
+        2 => u.map(|x| -x),
+        _ => v.map(|x| -x),
+    }
+}
+
 /// Along side k of a cell and away from it, of coordinates in the cell.
-fn to_side(k: u8, [s, t]: [f64; 2]) -> [f64; 2] {
+pub(super) fn to_side(k: u8, [s, t]: [f64; 2]) -> [f64; 2] {
     match k {
         0 => [s, t],
         1 => [t, 1.0 - s],

@@ -46,7 +46,7 @@ pub fn errors(limit: &Limit<'_>, samples: &[Sample]) -> Errors {
         .map(|s| {
             let (point, normal) = limit.normal(s.cell, s.at);
             let angle = norm(cross(normal, s.normal)).atan2(dot(normal, s.normal));
-            (norm(sub(point, s.point)), angle, s.area)
+            (norm(sub(point, s.point)), angle, s.own_area())
         })
         .collect();
     let area: f64 = each.iter().map(|e| e.2).sum();

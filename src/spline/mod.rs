@@ -74,10 +74,33 @@ pub struct Spline {
 }
 
 impl Spline {
+    /// The largest distance between both surfaces that was found, from samples of either and from vertices, source units.
+    pub fn farthest(&self) -> f64 {
+        self.deviation
+            .map_or(self.errors.max, |d| d.hausdorff.max(self.errors.max))
+    }
+
     /// The limit surface, to be handed to what asks for points.
     pub fn with_limit<T>(&self, take: impl FnOnce(&Limit<'_>) -> T) -> T {
         let evaluator = Evaluator::new(&self.cage);
         take(&Limit::new(&self.cage, &evaluator, &self.control))
+    }
+
+    /// The same surface, looking to its other side.
+    ///
+    /// # Errors
+    /// None, since it has cells already.
+    pub fn turned_over(self) -> Result<Self, SplineError> {
+        let cells = self.cage.cells.iter().map(|&[a, b, c, d]| [a, d, c, b]);
+        let is_crease = |(cell, k)| self.cage.is_crease((cell, 3 - k));
+        let corners = self.cage.is_corner.clone();
+        let cage = Cage::new(self.cage.vertices, cells.collect(), is_crease, corners)?;
+        Ok(Self { cage, ..self })
+    }
+
+    /// Whether it has no border.
+    pub fn is_closed(&self) -> bool {
+        self.cage.across.as_flattened().iter().all(Option::is_some)
     }
 
     /// Triangles for pictures and viewers.

@@ -31,4 +31,6 @@ pub struct Face {
     pub surface: BSplineSurface,
     /// Edges around it, counterclockwise seen from outside, and whether each is walked from its first end to its second.
     pub border: Vec<(u32, bool)>,
+    /// Of each of them the parameters of the surface where it begins and ends, as it is walked; between, it goes straight and evenly.
+    pub places: Vec<[[f64; 2]; 2]>,
 }

@@ -1,4 +1,4 @@
-//! Closed surfaces that bound cavities of others.
+//! Closed surfaces that bound cavities of others, and those that are inside out.
 //!
 //! *Enters:* closed surfaces as triangles. *Leaves:* of each that is turned inside out and lies inside another, which that is. *Source:* winding numbers as sums of solid angles, van Oosterom and Strackee, The solid angle of a plane triangle, 1983.
 
@@ -43,7 +43,7 @@ impl Closed<'_> {
         };
         let (low, high) = bounding_box(self.points);
         let (from, to) = bounding_box(other.points);
-        (0..3).all(|i| low[i] <= from[i] && to[i] <= high[i]) && self.winding(point) > 0.5
+        (0..3).all(|i| low[i] <= from[i] && to[i] <= high[i]) && self.winding(point).abs() > 0.5
     }
 }
 
@@ -61,6 +61,27 @@ pub fn voids(surfaces: &[Option<Closed<'_>>]) -> Vec<Option<usize>> {
         outer.min_by(|&a, &b| volumes[a].total_cmp(&volumes[b]))
     };
     volumes.iter().enumerate().map(around).collect()
+}
+
+/// Of every surface whether it is inside out: whether the largest that has it inside, or itself where none has, looks inward. `false` of those that are not closed.
+pub fn inside_out(surfaces: &[Option<Closed<'_>>]) -> Vec<bool> {
+    let volumes: Vec<f64> = surfaces
+        .iter()
+        .map(|s| s.map_or(0.0, |s| s.volume()))
+        .collect();
+    if volumes.iter().all(|&volume| volume >= 0.0) {
+        return vec![false; surfaces.len()];
+    }
+    let outermost = |(own, surface): (usize, &Option<Closed<'_>>)| {
+        let Some(inner) = surface else { return false };
+        let outer = (0..surfaces.len()).filter(|&i| {
+            volumes[i].abs() > volumes[own].abs()
+                && surfaces[i].is_some_and(|outer| outer.contains(inner))
+        });
+        let largest = outer.max_by(|&a, &b| volumes[a].abs().total_cmp(&volumes[b].abs()));
+        volumes[largest.unwrap_or(own)] < 0.0
+    };
+    surfaces.iter().enumerate().map(outermost).collect()
 }
 
 #[cfg(test)]
@@ -116,6 +137,23 @@ mod tests {
         }
         let expected = vec![None, Some(0), None, Some(2), None, None, Some(0)];
         assert_eq!(voids(&surfaces), expected);
+        let is_beside = |i: usize| i == 4;
+        let expected: Vec<bool> = (0..7).map(is_beside).collect();
+        assert_eq!(inside_out(&surfaces), expected);
+        // Turned over with all that is in it.
+        let turned: Vec<_> = parts
+            .iter()
+            .map(|(points, faces)| {
+                let faces: Vec<[u32; 3]> = faces.iter().map(|&[a, b, c]| [a, c, b]).collect();
+                (points, faces)
+            })
+            .collect();
+        let turned: Vec<Option<Closed>> = turned
+            .iter()
+            .map(|(points, faces)| Some(Closed { points, faces }))
+            .collect();
+        let expected: Vec<bool> = (0..7).map(|i| !is_beside(i)).collect();
+        assert_eq!(inside_out(&turned), expected);
         let mut open = surfaces;
         open[0] = None;
         assert_eq!(voids(&open), [None, None, None, Some(2), None, None, None]);

@@ -20,7 +20,8 @@ pub fn beside_spread(file: &Path) -> Result<(), String> {
     };
     let blind = ConeParams {
         strategy,
-        count: Some(count),
+        // Without cones there is nothing to count.
+        count: Some(count).filter(|&count| count > 0),
         ..ConeParams::default()
     };
     let before = models::finished(&triangles, blind)?;

@@ -18,6 +18,7 @@ mod grids;
 mod hard;
 #[cfg(unix)]
 mod interrupt;
+mod library;
 mod materials;
 mod packed;
 mod prescriptions;

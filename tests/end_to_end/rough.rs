@@ -68,10 +68,15 @@ fn terraces_of_a_hill_are_no_lines() {
 
 #[test]
 fn noise_is_no_line_and_many_irregular_points_are_told() {
+    let irregular = |document: &Value| document["grid"]["irregular"].as_array().map_or(0, Vec::len);
+    // What is smaller than a cell makes none.
     let (document, said) = built(|i, j| 0.8 * noise(i << 16 | j));
+    assert_eq!(features(&document), 0);
+    assert!(irregular(&document) <= 12, "{said}");
+    let (document, said) = built(|i, j| 1.5 * noise(i << 16 | j));
     assert!(features(&document) <= 3, "{}", features(&document));
     assert!(!said.contains("in no feature"), "{said}");
-    let irregular = document["grid"]["irregular"].as_array().map_or(0, Vec::len);
+    let irregular = irregular(&document);
     let sentence = format!("has {irregular} irregular points in ");
     assert!(
         irregular > 40 && said.contains(&sentence),

@@ -41,6 +41,8 @@ pub struct Component {
     pub name: String,
     /// True where it has no boundary.
     pub closed: bool,
+    /// True where the mesh is closed and inside out: the surface is turned over and looks outward.
+    pub inside_out: bool,
     /// Name of the component whose cavity it bounds: its faces are in the STEP file of that one, and it has none of its own. Absent where it bounds none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub void_of: Option<String>,
@@ -169,6 +171,7 @@ impl Component {
         Self {
             name: name.to_owned(),
             closed: faces.shell.is_closed,
+            inside_out: false,
             void_of: None,
             cells: cage.cells.len(),
             control_points: cage.vertices,

@@ -103,6 +103,9 @@ fn table(body: &mut String, c: &Component, unit: &str) {
     row("normals off, 95 % (degrees)", figure(normals.p95_degrees));
     row("area turned over", figure(c.turned_over_area));
     row("least Jacobian over its mean", figure(c.least_jacobian));
+    if c.inside_out {
+        row("the mesh is inside out", "turned over".to_owned());
+    }
     if let Some(solid) = &c.void_of {
         row("bounds a cavity of", solid.clone());
     }

@@ -198,8 +198,7 @@ impl<'a> Splitter<'a> {
         let layout = &self.atlas.patches;
         let id = layout.face_patch[f];
         let patch = &layout.patches[id.index()];
-        let uv = layout.uv[f][k];
-        let packed = [0, 1].map(|i| patch.packed_scale * uv[i] + patch.packed_offset[i]);
+        let packed = patch.packed(layout.uv[f][k]);
         if !packed.iter().all(|x| (*x as f32).is_finite()) {
             return Err(ExportError::NotFinite {
                 place: format!("surface.glb TEXCOORD_0 of face {f}"),

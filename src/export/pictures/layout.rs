@@ -114,8 +114,7 @@ fn packed(canvas: &mut Canvas, atlas: &AffineAtlas, corner: [f64; 2], side: f64,
     }
     let place = |f: FaceId, p: [f64; 2]| {
         let patch = layout.patches.get(layout.face_patch[f].index());
-        let (scale, offset) = patch.map_or((0.0, [0.0; 2]), |p| (p.packed_scale, p.packed_offset));
-        frame([0, 1].map(|i| p[i] * scale + offset[i]))
+        frame(patch.map_or([0.0; 2], |patch| patch.packed(p)))
     };
     faces(canvas, atlas, &layout.uv, place, full);
 }

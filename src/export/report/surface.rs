@@ -221,11 +221,11 @@ fn plane(
         chart.push(std::array::from_fn::<u32, 2, _>(|i| {
             quantise(uv[i], [low[i], high[i]], 8_388_607.0)
         }));
-        let (scale, offset) = (atlas.patches.patches.get(patch.index()))
-            .map_or((0.0, [0.0; 2]), |p| (p.packed_scale, p.packed_offset));
         let uv = atlas.patches.uv[f][k];
+        let of_patch = atlas.patches.patches.get(patch.index());
+        let uv = of_patch.map_or([0.0; 2], |patch| patch.packed(uv));
         packed.push(std::array::from_fn::<u32, 2, _>(|i| {
-            quantise(uv[i] * scale + offset[i], [0.0, 1.0], 65_535.0)
+            quantise(uv[i], [0.0, 1.0], 65_535.0)
         }));
         cells.push(board[f][k]);
     }

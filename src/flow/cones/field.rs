@@ -28,9 +28,14 @@ use std::sync::Arc;
 /// Least angle of a cone, quarter turns: around a vertex of two quads these would share two edges.
 const LEAST_QUARTERS: i64 = 3;
 
-/// Distance at which cones of opposite curvature cancel each other, and over which the surface's curvature counts as spread, in square roots of the component's area: about a cell of a grid of ten
-/// thousand quads. Half of the cones of a scan go, and the deviation of the log scale grows by up to a quarter, from 0.064 to 0.079.
-const NEAR: f64 = 0.01;
+/// Distance at which cones of opposite curvature cancel each other, and over which the surface's curvature counts as spread: so much of a side of the grid's cells, which have no place for
+/// more, ...
+const NEAR: f64 = 2.0 / 3.0;
+/// ... but not less than this, in square roots of the component's area: about a cell of a grid of ten thousand quads. Half of the cones of a scan go, and the deviation of the log scale
+/// grows by up to a quarter, from 0.064 to 0.079.
+const LEAST_NEAR: f64 = 0.01;
+/// ... and not more than this: that of forty cells. With fewer cones than their shape asks for, parts of a surface shrink to nothing.
+const MOST_NEAR: f64 = 0.1;
 
 /// Length on either side of a border's edge over which teeth are none of the border's directions, in the same unit: about a cell of a grid of two thousand quads.
 const RAGGED: f64 = 0.02;
@@ -137,14 +142,15 @@ fn along(
         }
     }
     let zigzag = leans(own, &angle, &length, |h| side_of[h], ZIGZAG * size);
-    let even = diffused(own, &angle, &area, NEAR * size).map_err(FieldError::from)?;
+    let near = size * (NEAR * params.cell).clamp(LEAST_NEAR, MOST_NEAR);
+    let even = diffused(own, &angle, &area, near).map_err(FieldError::from)?;
     let narrow = open_narrow(own, &angle, &area, &length);
     own.halfedges()
         .for_each(|h| lean[h] += zigzag[h] + even[h] + narrow[h]);
     let mut field = cross_field(own, &angle, &area, &pull, &lean)?;
     let asked = GridCones {
         least: LEAST_QUARTERS,
-        near: NEAR * size,
+        near,
         most: count.unwrap_or(usize::MAX),
     };
     let (signature, moved) = field.grid_signature(&surface, &angle, &asked)?;

@@ -11,7 +11,7 @@ use crate::flow::delaunay::Delaunay;
 use crate::flow::looped::LoopedSurface;
 use crate::flow::scale::at_unit_scale;
 use crate::flow::schemes::FaceShape;
-use crate::flow::seamless::{SeamlessError, SeamlessParams, SeamlessStep, Start, seamless};
+use crate::flow::seamless::{SeamlessError, SeamlessParams, Start, seamless};
 use crate::flow::signature::Signature;
 use crate::flow::step::FlowStep;
 use crate::flow::straighten::{StraightenError, Straightened, straighten};
@@ -65,7 +65,7 @@ impl Sought<'_> {
         let log_length = found.penner.iter().map(|l| 0.5 * l).collect();
         let lines = on.glued.as_flattened();
         let mut metric = with_lengths(self.surface, self.ground, on, log_length, lines)?;
-        metric.history = found.history.iter().map(line).collect();
+        metric.history = found.history.iter().map(FlowStep::from).collect();
         metric.max_curvature_error = found.max_error;
         if let Some(record) = &mut metric.quarter_turns {
             let turns = self.signature.turning.iter().copied();
@@ -231,16 +231,4 @@ fn flipped(ground: &SurfaceDelaunay, log_length: EdgeVec<f64>) -> (Delaunay, Fac
     let mut shape = FaceVec::default();
     flat.evaluate(&VertexVec::filled(0.0, b.vertex_count()), &mut shape);
     (flat, shape)
-}
-
-/// A line of the convergence record.
-fn line(step: &SeamlessStep) -> FlowStep {
-    FlowStep {
-        iteration: step.iteration,
-        max_error: step.max_error,
-        energy: step.energy,
-        step: step.step,
-        flips: step.flips,
-        flow_time: step.iteration as f64,
-    }
 }

@@ -11,7 +11,7 @@ use super::norm::Norm;
 use super::normal::Normal;
 use super::state::{Problem, State};
 use super::{SeamlessError, SeamlessParams, SeamlessStep};
-use crate::flow::step::FLOAT64_FLOOR;
+use crate::flow::step::{FLOAT64_FLOOR, FlowStep};
 use crate::geometry::ids::EdgeVec;
 use crate::observe::Observer;
 
@@ -130,6 +130,7 @@ pub(super) fn solve(
             error = now.max_error,
             "seamless metric"
         );
+        observer.flow_step(&FlowStep::from(&now));
         history.push(now);
         last = Some(normal);
     }
@@ -162,6 +163,19 @@ fn refine(
             break;
         }
         (*penner, *state) = (next, found);
+    }
+}
+
+impl From<&SeamlessStep> for FlowStep {
+    fn from(step: &SeamlessStep) -> Self {
+        Self {
+            iteration: step.iteration,
+            max_error: step.max_error,
+            energy: step.energy,
+            step: step.step,
+            flips: step.flips,
+            flow_time: step.iteration as f64,
+        }
     }
 }
 

@@ -21,7 +21,7 @@ use crate::read::gridded::read_gridded;
 use crate::spline::cad::Faces;
 use crate::spline::patches::Patches;
 use crate::spline::tessellation::Tessellation;
-use crate::spline::voids::{Closed, voids};
+use crate::spline::voids::{Closed, inside_out, voids};
 use crate::spline::{self, Gridded, Spline, SplineError};
 use std::path::Path;
 
@@ -65,6 +65,8 @@ pub enum Size {
 pub struct FittedComponent {
     /// Name.
     pub name: String,
+    /// Whether the mesh is inside out there; the surface looks outward.
+    pub inside_out: bool,
     /// The component whose cavity this bounds, by its place among them: its faces are in that one's STEP file.
     pub void_of: Option<usize>,
     /// Its surface.
@@ -185,20 +187,25 @@ pub fn fit(
     };
     let count = splines.len();
     let (mut components, mut unfitted, mut first) = (Vec::new(), Vec::new(), None);
-    for (index, (name, spline)) in splines.into_iter().enumerate() {
+    let mut fitted_as = vec![None; count];
+    for (index, (name, placed, spline)) in oriented(splines).into_iter().enumerate() {
         enter(observer, "B-splines", index, count)?;
         let fitted = spline.and_then(|spline| {
             let (faces, patches) = spline.b_splines(params.angle).map_err(of_spline(&name))?;
             Ok((spline, faces, patches))
         });
         match fitted {
-            Ok((spline, faces, patches)) => components.push(FittedComponent {
-                name,
-                void_of: None,
-                spline,
-                faces,
-                patches,
-            }),
+            Ok((spline, faces, patches)) => {
+                fitted_as[index] = Some(components.len());
+                components.push(FittedComponent {
+                    name,
+                    inside_out: placed.inside_out,
+                    void_of: placed.void_of,
+                    spline,
+                    faces,
+                    patches,
+                });
+            }
             Err(error) => {
                 let failure = Failure::from(&error);
                 unfitted.push(Unfitted { name, failure });
@@ -206,7 +213,9 @@ pub fn fit(
             }
         }
     }
-    set_voids(&mut components);
+    for component in &mut components {
+        component.void_of = component.void_of.and_then(|index| fitted_as[index]);
+    }
     match first {
         Some(error) if components.is_empty() => Err(error),
         _ => Ok(FittedAsset {
@@ -217,24 +226,55 @@ pub fn fit(
     }
 }
 
-/// Finds out which components bound cavities of others.
-fn set_voids(components: &mut [FittedComponent]) {
-    let is_closed = |c: &&FittedComponent| c.faces.shell.is_closed;
-    if components.iter().filter(is_closed).count() < 2 {
-        return;
+/// Turns over what is inside out, and finds out what bounds cavities of others.
+fn oriented(splines: Splines) -> Vec<(String, Placed, Result<Spline, FitAssetError>)> {
+    let closed = |(_, spline): &(String, Result<Spline, FitAssetError>)| {
+        let spline = spline.as_ref().ok().filter(|spline| spline.is_closed());
+        spline.map(Spline::tessellation)
+    };
+    let mut surfaces: Vec<Option<Tessellation>> = splines.iter().map(closed).collect();
+    let turned = inside_out(&all(&surfaces));
+    for (surface, _) in surfaces
+        .iter_mut()
+        .zip(&turned)
+        .filter(|(_, turned)| **turned)
+    {
+        let faces = surface.iter_mut().flat_map(|surface| &mut surface.faces);
+        faces.for_each(|[_, b, c]| std::mem::swap(b, c));
     }
-    let closed = |c: &FittedComponent| is_closed(&c).then(|| c.spline.tessellation());
-    let surfaces: Vec<Option<Tessellation>> = components.iter().map(closed).collect();
-    let surfaces = surfaces.iter().map(|s| {
-        s.as_ref().map(|s| Closed {
+    let voids = voids(&all(&surfaces));
+    let placed = turned.into_iter().zip(voids);
+    let each = splines.into_iter().zip(placed);
+    let each = each.map(|((name, spline), (inside_out, void_of))| {
+        let spline = spline.and_then(|spline| match inside_out {
+            true => spline.turned_over().map_err(of_spline(&name)),
+            false => Ok(spline),
+        });
+        let placed = Placed {
+            inside_out,
+            void_of,
+        };
+        (name, placed, spline)
+    });
+    each.collect()
+}
+
+/// How a surface lies among the others.
+#[derive(Clone, Copy)]
+struct Placed {
+    inside_out: bool,
+    void_of: Option<usize>,
+}
+
+fn all(surfaces: &[Option<Tessellation>]) -> Vec<Option<Closed<'_>>> {
+    let surfaces = surfaces.iter().map(Option::as_ref);
+    let closed = surfaces.map(|surface| {
+        surface.map(|s| Closed {
             points: &s.points,
             faces: &s.faces,
         })
     });
-    let found = voids(&surfaces.collect::<Vec<_>>());
-    for (component, void_of) in components.iter_mut().zip(found) {
-        component.void_of = void_of;
-    }
+    closed.collect()
 }
 
 /// Tells that a stage begins, unless the job was to stop.
@@ -317,6 +357,7 @@ impl FittedAsset {
         let components = self.components.iter().map(|c| {
             let FittedComponent {
                 name,
+                inside_out,
                 void_of,
                 spline,
                 faces,
@@ -324,6 +365,7 @@ impl FittedAsset {
             } = c;
             let void_of = void_of.map(|i| self.components[i].name.clone());
             Component {
+                inside_out: *inside_out,
                 void_of,
                 ..Component::new(name, spline, faces, patches)
             }

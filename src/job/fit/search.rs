@@ -58,7 +58,7 @@ pub(super) fn of_mesh(
         let enter = |stage| enter(observer, stage, index, count);
         let fitted = |component: Component, spacing: Spacing| {
             let charting = chart(component, &requests, &config, spacing, observer, &enter)?;
-            let on = |cells: usize| one(&charting, &config, &name, cells, &enter);
+            let on = |cells: usize| one(&charting, &config, &name, cells, observer, &enter);
             match params.size {
                 Size::Default | Size::Cells(_) => on(config.grid.cells),
                 Size::OfDiagonal(part) => coarsest(&on, &name, |_| part),
@@ -90,12 +90,16 @@ fn one(
     config: &Config,
     name: &str,
     cells: usize,
+    observer: &dyn Observer,
     enter: &impl Fn(&'static str) -> Result<(), BuildError>,
 ) -> Result<Spline, FitAssetError> {
     enter("grid")?;
-    let gridded = gridded(charting, config, cells).map_err(|source| FitAssetError::Grid {
-        name: name.to_owned(),
-        source,
+    let gridded = gridded(charting, config, cells, observer).map_err(|source| match source {
+        GridError::Cancelled => BuildError::Cancelled.into(),
+        source => FitAssetError::Grid {
+            name: name.to_owned(),
+            source,
+        },
     })?;
     enter("spline")?;
     spline::fit(&gridded).map_err(of_spline(name))
@@ -113,7 +117,7 @@ fn coarsest(
         let growth = match &tried {
             Ok(spline) => {
                 let (off, wanted) = (
-                    spline.errors.max / spline.diagonal,
+                    spline.farthest() / spline.diagonal,
                     tolerance(spline.diagonal),
                 );
                 if off <= wanted {
@@ -143,7 +147,7 @@ fn coarsest(
             break;
         }
         match on(middle) {
-            Ok(spline) if spline.errors.max <= tolerance(spline.diagonal) * spline.diagonal => {
+            Ok(spline) if spline.farthest() <= tolerance(spline.diagonal) * spline.diagonal => {
                 (near, cells) = (spline, middle);
             }
             Ok(_) | Err(FitAssetError::Grid { .. }) => too_coarse = middle,
@@ -154,23 +158,19 @@ fn coarsest(
 }
 
 /// A grid of about so many cells with the surface on it, in source units.
-fn gridded(charting: &Charting, config: &Config, cells: usize) -> Result<Gridded, GridError> {
+fn gridded(
+    charting: &Charting,
+    config: &Config,
+    cells: usize,
+    observer: &dyn Observer,
+) -> Result<Gridded, GridError> {
     let mut params = config.grid.clone();
     params.cells = cells;
     let surface = charting.surface.clone();
-    let (surface, layout, grid) = grid::grid(surface, &params, config.patches.padding)?;
-    let frame = &charting.frame;
-    let out = |points: &[[f64; 3]]| points.iter().map(|&p| frame.leave(p)).collect();
-    let faces = surface.mesh.connectivity.faces();
-    let cells = grid.cells_in_blocks();
-    Ok(Gridded {
-        positions: out(surface.mesh.positions.as_slice()),
-        faces: surface.mesh.connectivity.to_faces(),
-        block: faces.map(|f| layout.face_patch[f].index() as u32).collect(),
-        uv: layout.uv.as_slice().to_vec(),
-        points: out(&grid.points),
-        cells: cells.iter().map(|c| c.corners).collect(),
-        cell_block: cells.iter().map(|c| c.block).collect(),
-        cell_at: cells.iter().map(|c| c.at).collect(),
-    })
+    let (surface, layout, grid) = grid::grid(surface, &params, config.patches.padding, observer)?;
+    let mut gridded = Gridded::new(&surface.mesh, &layout, &grid);
+    for p in gridded.positions.iter_mut().chain(&mut gridded.points) {
+        *p = charting.frame.leave(*p);
+    }
+    Ok(gridded)
 }

@@ -3,6 +3,11 @@
 use super::FittedAsset;
 use std::fmt;
 
+/// STEP files with more control points a cell are large.
+const MANY: usize = 20;
+/// Shorter diagonals are small beside the accuracy of CAD programs, millimetres.
+const SMALL: f64 = 0.1;
+
 impl fmt::Display for FittedAsset {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for c in self.document().components {
@@ -31,6 +36,17 @@ impl fmt::Display for FittedAsset {
                 c.normal_deviation.mean_degrees,
                 c.normal_deviation.p95_degrees,
             )?;
+            if let Some(both) = c.both_ways {
+                writeln!(
+                    f,
+                    "  of either from the other, vertices and borders included: at most {:.3e} ({:.1e})",
+                    both.max_of_diagonal * diagonal,
+                    both.max_of_diagonal,
+                )?;
+            }
+            if c.inside_out {
+                writeln!(f, "  the mesh is inside out: the surface looks outward")?;
+            }
             if let Some(solid) = &c.void_of {
                 writeln!(
                     f,
@@ -48,6 +64,21 @@ impl fmt::Display for FittedAsset {
                 step.normal_jump_irregular.p95_degrees,
                 step.normal_jump_irregular.max_degrees,
             )?;
+            if step.control_points > MANY * c.cells {
+                writeln!(
+                    f,
+                    "  most of these lie beside irregular points, where cells are halved {} times; a larger --angle needs fewer",
+                    step.halvings
+                )?;
+            }
+            let millimetres = 1e3 * self.params.unit.metres() * diagonal;
+            if millimetres < SMALL {
+                writeln!(
+                    f,
+                    "  {millimetres:.1e} mm long: CAD programs take points for one that are 1e-7 mm apart, {:.0e} of this; give the unit of the mesh (--unit), or scale it",
+                    1e-7 / millimetres
+                )?;
+            }
             if step.normal_jump_corners.max_degrees > 0.0 {
                 writeln!(
                     f,

@@ -49,6 +49,7 @@ impl FittedAsset {
             spline,
             faces,
             patches,
+            ..
         } = &self.components[index];
         let cage = &spline.cage;
         let file = |extension: &str, text: &dyn Fn(&mut dyn Write) -> io::Result<()>| {

@@ -201,3 +201,48 @@ fn sheets_without_volume_go_where_they_hang_on_something() {
         boxes.faces[..2]
     );
 }
+
+/// A strip of `count` rectangles that bends by 20° at each side, given from both sides. The back has the other diagonals.
+fn bent_card(count: u32) -> Soup {
+    let (mut positions, mut faces) = (Vec::new(), Vec::new());
+    let (mut x, mut z) = (0.0, 0.0);
+    for k in 0..=count {
+        positions.extend([[x, 0.0, z], [x, 1.0, z]]);
+        let angle = f64::from(k) * 20f64.to_radians();
+        (x, z) = (x + angle.cos(), z + angle.sin());
+        if k < count {
+            let [a, d, b, c] = [0, 1, 2, 3].map(|i| 2 * k + i);
+            faces.extend([[a, b, c], [a, c, d], [a, d, b], [b, d, c]]);
+        }
+    }
+    soup(positions, faces)
+}
+
+#[test]
+fn of_cards_with_other_diagonals_on_their_backs_one_side_stays() {
+    for count in [1, 2, 7] {
+        let result = repaired(&bent_card(count));
+        let mesh = only(&result);
+        assert_eq!(chi(mesh), 1);
+        assert_eq!(mesh.connectivity.topology().boundary_loops, 1);
+        assert!((area(mesh) - f64::from(count)).abs() < 1e-12);
+        assert_eq!(self::count(&result, "removed_back_faces"), 2 * count as u64);
+        assert!(mesh.source_face.iter().all(|f| f % 4 < 2));
+    }
+    // A hexagon, whose back has no triangle and no diagonal of the front.
+    let corner = |k: u32| [f64::from(k).cos(), f64::from(k).sin(), 0.0];
+    let front = [[0, 1, 2], [0, 2, 4], [2, 3, 4], [0, 4, 5]];
+    let back = [[1, 0, 3], [1, 3, 2], [3, 0, 5], [3, 5, 4]];
+    let hexagon = soup((0..6).map(corner).collect(), [front, back].concat());
+    assert_eq!(count(&repaired(&hexagon), "removed_back_faces"), 4);
+    // Nor is a double pyramid one, however flat: its sides have vertices of their own.
+    let mut positions: Vec<_> = (0..6).map(corner).collect();
+    positions.extend([[0.0, 0.0, 1e-9], [0.0, 0.0, -1e-9]]);
+    let sides = (0..6).flat_map(|k| [[k, (k + 1) % 6, 6], [(k + 1) % 6, k, 7]]);
+    let flat = soup(positions, sides.collect());
+    assert_eq!(count(&repaired(&flat), "removed_back_faces"), 0);
+    // A lens is no sheet: it holds volume.
+    let mut lens = hexagon;
+    lens.positions[2][2] = 1e-4;
+    assert_eq!(count(&repaired(&lens), "removed_back_faces"), 0);
+}

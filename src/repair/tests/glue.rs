@@ -161,3 +161,34 @@ fn one_sided_strips_are_refused_and_the_others_built() {
     assert_eq!(result.locate(3), Some((0, VertexId::new(3))));
     assert_eq!(count(&result, "flipped_faces"), 0);
 }
+
+#[test]
+fn closed_components_that_look_inward_are_found() {
+    use crate::repair::inside_out::inside_out;
+    // Cubes beside each other, one in another, and an open one.
+    let moved = |side: f64, by: f64, is_turned: bool| {
+        let mut cube = cube(2);
+        for p in &mut cube.positions {
+            *p = p.map(|x| side * x + by);
+        }
+        if is_turned {
+            cube.faces.iter_mut().for_each(|f| f.swap(1, 2));
+        }
+        cube
+    };
+    let mut all = moved(1.0, 0.0, false);
+    let mut add = |other: Soup, open: usize| {
+        let first = all.positions.len() as u32;
+        all.positions.extend(other.positions);
+        let faces = other.faces.into_iter().skip(open);
+        all.faces.extend(faces.map(|f| f.map(|v| v + first)));
+    };
+    add(moved(0.5, 0.5, true), 0);
+    add(moved(1.0, 10.0, true), 0);
+    add(moved(1.0, 20.0, true), 1);
+    add(moved(1.0, 30.0, false), 0);
+    let soup = soup(all.positions, all.faces);
+    let result = repaired(&soup);
+    assert_eq!(result.components.len(), 5);
+    assert_eq!(inside_out(&result.components), [2]);
+}

@@ -109,19 +109,8 @@ fn uses(faces: &Faces) -> Vec<Vec<(usize, usize)>> {
 
 /// Where part t of a border edge is on its face.
 fn on_border(faces: &Faces, (f, i): (usize, usize), t: f64) -> [f64; 2] {
-    let (side, [from, to]) = faces.ranges[f][i];
-    let last = faces.shell.faces[f]
-        .surface
-        .knots
-        .each_ref()
-        .map(|k| k[k.len() - 1]);
-    let along = from + t * (to - from);
-    match side {
-        0 => [along, 0.0],
-        1 => [last[0], along],
-        2 => [along, last[1]],
-        _ => [0.0, along],
-    }
+    let [from, to] = faces.shell.faces[f].places[i];
+    [0, 1].map(|axis| from[axis] + t * (to[axis] - from[axis]))
 }
 
 #[test]

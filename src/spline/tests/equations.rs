@@ -41,6 +41,7 @@ fn samples(limit: &Limit<'_>) -> Vec<Sample> {
             weight: 1.0 + at[1],
             cell,
             at: wrong,
+            border: None,
         }
     })
     .collect()
@@ -67,15 +68,15 @@ fn a_step_minimises_distances_to_tangent_planes() {
         move_places(&limit, &mut samples);
         let found = equations.step(&limit, &samples, 100).unwrap();
         let beside: Vec<Beside> = samples.iter().map(|s| Beside::new(&limit, s)).collect();
-        assert!(beside.iter().any(|b| b.along < 1.0));
+        assert!(beside.iter().any(|b| b.across < 1.0));
         // The sum itself, of surfaces through the same places.
         let fair = FAIR * samples.iter().map(|s| s.area).sum::<f64>() / control.len() as f64;
         let energy = |control: &[[f64; 3]]| -> f64 {
             let moved = Limit::new(cage, evaluator, control);
             let distances = samples.iter().zip(&beside).map(|(s, b)| {
                 let off = sub(s.point, moved.at(s.cell, s.at).point);
-                let towards = dot(off, b.normal).powi(2);
-                s.area * s.weight * (towards + b.along * (dot(off, off) - towards))
+                let towards = dot(off, b.direction).powi(2);
+                s.area * s.weight * (towards + b.across * (dot(off, off) - towards))
             });
             let differences = equations.differences.iter().map(|d| {
                 let lacks = sub(d.wanted, d.sum(|v| control[v as usize]));

@@ -88,6 +88,7 @@ fn fairness_unfolds_what_samples_fold() {
                 weight: 1.0,
                 cell,
                 at,
+                border: None,
             }
         })
         .collect();
